@@ -5,11 +5,12 @@ from __future__ import annotations
 from typing import Final
 
 from emu.boards.epuck.analog import Accelerometer, Infrared, Microphones
+from emu.boards.epuck.bluetooth import Bluetooth
 from emu.boards.epuck.camera.camera import Camera
 from emu.boards.epuck.config import CHIPS, CONFIG, CRYSTAL_HZ
 from emu.boards.epuck.motors import Motors
 from emu.boards.epuck.remote import Remote
-from emu.boards.epuck.simple import Battery, Bluetooth, Codec, Leds, Selector
+from emu.boards.epuck.simple import Battery, Codec, Leds, Selector
 from emu.boards.noise import Noise
 from emu.peripherals import Peripherals
 

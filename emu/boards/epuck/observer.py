@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from typing import Final
 
+from emu.boards.epuck.bluetooth import Bluetooth
 from emu.boards.epuck.board import Epuck
-from emu.boards.epuck.simple import Bluetooth
 from emu.peripherals.uart.uart import Uart
 
 TOPICS: Final = ("leds", "motors", "uart1", "uart2", "sound")

@@ -2,9 +2,8 @@
 
 It is slow and simple, and the reference for native code. One `Interpreter` serves one CPU. The sequencer prepares it
 for each instruction with `begin` and commits the stores with `commit`. Stores are deferred to the end of the row for
-two
-reasons: an address error inhibits all of them (isa.md §14.4), and a data write overrides the same instruction's other
-effects on the register (isa.md §2.2, §2.3).
+two reasons: an address error inhibits all of them (isa.md §14.4), and a data write overrides the same instruction's
+other effects on the register (isa.md §2.2, §2.3).
 """
 
 from __future__ import annotations

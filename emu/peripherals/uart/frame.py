@@ -58,7 +58,7 @@ def pack(mode: Number, word: Number) -> Number:
     return data << 1 | parity(mode, data) << 9 | (1 | (mode & 1) << 1) << first_stop(mode)
 
 
-def judge(mode: Number, sampled: Number) -> Number:
+def unpack(mode: Number, sampled: Number) -> Number:
     """Return data and error bits of a sampled frame. UNVERIFIED: of two stop bits only the first is checked."""
     data = data_of(mode, sampled >> 1)
     broken = (sampled >> first_stop(mode) & 1) ^ 1

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import Final
 
-from emu.peripherals.uart.frame import FRAMING_MARK, PARITY_MARK, data_of, first_stop, is_nine, judge, length, pack
+from emu.peripherals.uart.frame import FRAMING_MARK, PARITY_MARK, data_of, first_stop, is_nine, length, pack, unpack
 from emu.peripherals.uart.rx_queue import CAPACITY, ERRORS, RxQueueOperands
 from emu.system.events import NEVER
 from emu.system.rules import Cell, EventSlot, InterruptLine, Number, RuleBuilder, request
@@ -138,7 +138,7 @@ def schedule_frame(
     """
     mode, tick = m.get(u.mode), m.get(u.brg) + 1
     middle = edge(m, u, start, tick) + ((first_stop(mode) << 4) + 8) * tick  # middle of the first stop bit (§10.2)
-    m.put(u.incoming, judge(mode, sampled))
+    m.put(u.incoming, unpack(mode, sampled))
     m.put(u.rx_bit, bit_q8)
     m.put(u.done, middle)
     m.put(u.rx_wave, (wave | 0xFFFF << length(mode)) & 0xFFFF)  # after the frame the line is high

@@ -195,10 +195,8 @@ class Uart(Peripheral):
         """Run the machine until `pattern` has been sent, for at most `within` ms of simulated time.
 
         Text and bytes match literally; a compiled bytes pattern is searched. The search starts after the last match.
-        The
-        first call starts to collect output. The machine stops in the cycle in which the last byte of the match has left
-        the
-        pin. Raises ExpectError (an AssertionError) with the output received instead, and with the fault if any.
+        The first call starts to collect output. The machine stops in the cycle in which the last byte of the match has
+        left the pin. Raises ExpectError (an AssertionError) with the output received instead, and with any fault.
         """
         if self._matcher is None:
             self._matcher = OutputMatcher(
