@@ -1,8 +1,7 @@
 """Reader of dsPIC30F ELF executables: program words, sections and symbols, as specified by abi-elf.md §6.8.
 
 Input: contents of a file written by this project's linker, XC16 or C30. Output: an `Image`. The contents come from
-section
-headers; program headers only translate the addresses of psv and EEPROM sections (abi-elf.md §6.4).
+section headers; program headers only translate the addresses of psv and EEPROM sections (abi-elf.md §6.4).
 """
 
 from __future__ import annotations

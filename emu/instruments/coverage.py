@@ -1,8 +1,7 @@
 """Coverage from exact counts of executed instructions and taken branches.
 
-Input: a machine. Outputs: `Counts`, and lcov and Cobertura reports made from them. Coverage
-refers
-to the code in the image, optimised or not. Functions that the linker removed are not in the reports.
+Input: a machine. Outputs: `Counts`, and lcov and Cobertura reports made from them. Coverage refers to the code in the
+image, optimised or not. Functions that the linker removed are not in the reports.
 """
 
 from __future__ import annotations

@@ -188,8 +188,7 @@ class Sequencer:
         """Request a hard trap at this boundary: no instruction can be fetched at PC (isa.md §14.4, causes 4 and 5).
 
         UNVERIFIED: if a trap of equal or higher level is in progress, the device resets. No boundary precedes cycle 0,
-        so
-        a fetch error in cycle 0 counts as one in cycle 1.
+        so a fetch error in cycle 0 counts as one in cycle 1.
         """
         state = self.state
         state.cycle = max(state.cycle, 1)

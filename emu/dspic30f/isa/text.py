@@ -104,8 +104,7 @@ def format(insn: Insn, pc: int = 0, symbol: SymbolOf | None = None, source: bool
     """Return the assembly text of an instruction at program address ``pc``, as binutils prints it.
 
     ``symbol(address, space)`` may return a name for an address; ``space`` is "code" or "data". With ``source``, the
-    text
-    can be parsed again: it keeps negative literals and wrapped targets, and omits ignored register fields.
+    text can be parsed again: it keeps negative literals and wrapped targets, and omits ignored register fields.
     """
     site = Site(insn.row, pc)
     tokens = [t for kind in kinds_of(insn.row.syntax) for t in kind.write(insn.x, site, symbol, source)]

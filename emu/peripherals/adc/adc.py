@@ -259,8 +259,7 @@ class Adc(Peripheral):
         """Complete every conversion that ends at or before `cycle`, except the one that requests the interrupt.
 
         The event handler completes that one; if the event is due now, it has not run yet. While the converter's clock
-        is
-        stopped, no conversion ends.
+        is stopped, no conversion ends.
         """
         if not self.is_frozen:
             self._convert_by(min(cycle, self.events.due(self._step) - 1))

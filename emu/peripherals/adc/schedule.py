@@ -122,8 +122,7 @@ class AnalogInputs:
         """Set the native equivalent of `source`: int64 code(record, data, channel, cycle); address 0 removes it.
 
         It must be valid for all cycles that native code may reach. The call has no effect if the channel has a
-        different
-        source by now.
+        different source by now.
         """
         if self._source[channel] == source:
             self._native_sources[2 * channel], self._native_sources[2 * channel + 1] = code, data

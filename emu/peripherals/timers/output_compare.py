@@ -166,8 +166,7 @@ class Compare(Peripheral):
         """Resume the clock. The time base may have continued while it was stopped.
 
         A change determined before the clock stopped still happens (§9): with PWM in the cycle of the match, otherwise
-        one
-        cycle later.
+        one cycle later.
         """
         waiting = self.remaining_delay(self._pin_event)
         super().thaw(cycle)

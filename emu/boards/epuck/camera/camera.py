@@ -105,8 +105,8 @@ class Camera(BoardPart, I2cDevice):
         """Set a scene that is computed pixel by pixel.
 
         The camera calls `pixels(y, columns, cycle)` once for each line that the firmware reads; `cycle` is the rising
-        edge
-        of the line's HREF. With `has_native_source`, native code that uses `native` may render the same scene instead.
+        edge of the line's HREF. With `has_native_source`, native code that uses `native` may render the same scene
+        instead.
         """
         self._pixels, self._has_native_source, self._still = pixels, has_native_source, None
         self.native.setting = 0

@@ -45,8 +45,7 @@ def trace_block(
     """Return the block at `start`.
 
     It ends with a flow, with the instruction at `last`, or before an address in `ends`. A branch within it does not
-    skip
-    an instruction in `barriers`.
+    skip an instruction in `barriers`.
     """
     items: list[TraceItem] = []
     pc, branches, joined = start, 0, start
