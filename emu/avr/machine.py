@@ -180,7 +180,7 @@ class Atmega328p:
         """Write bytes of data memory, without the effects of a write. Raises KeyError."""
         address = self._resolved(place)
         self.state.data[address : address + len(octets)] = list(octets)
-        self.state.tracing = self.state.round = self.state.resting = 0  # the loop may end
+        self.state.tracing = self.state.round = self.state.resting = self.state.counts_until = 0  # the loop may end
 
     def write_eeprom(self, address: int, octets: bytes) -> None:
         """Write bytes of the EEPROM. Raises ValueError if they are not within its 1,024 bytes."""

@@ -19,7 +19,7 @@ static void enter_interrupt(struct avr *m, u32 pending)
     set_pair(m->data + SPL, sp - 2);
     m->data[SREG_AT] &= (u8)~FLAG_I;
     m->pc = (u16)(2 * vector + (m->data[MCUCR] & 2 ? m->boot_start : 0));
-    m->tracing = 0, m->round = 0;
+    m->tracing = 0, m->round = 0, m->counts_until = 0;
     m->cycle += INTERRUPT_CYCLES;
     acknowledge(m, vector);
 }

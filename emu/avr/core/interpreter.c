@@ -28,8 +28,7 @@ do_COUNT_DOWN : { \
     if (!(s & FLAG_Z)) { \
         struct countdown c = countdown_of(code, insn); \
         pc = insn->k, cycle++; \
-        if (deadline > cycle + 1) \
-            passed = count_down(data, &s, &c, deadline - cycle - 1), cycle += passed, m->skipped += passed; \
+        cycle += count_down(m, &s, &c, cycle, deadline); \
     } \
     NEXT(1); \
 } \
@@ -48,7 +47,6 @@ leave: \
 static void interpret(struct avr *m, const struct insn *code)
 {
     INSTRUCTION_LABELS
-    u64 passed;
     INTERPRETER_BEGIN();
     INSTRUCTION_BODIES
     INTERPRETER_END();
@@ -60,7 +58,7 @@ static void interpret(struct avr *m, const struct insn *code)
         cycle += (cycles); \
         if (cycle >= deadline) \
             goto leave; \
-        if (pc == m->trace_pc || cycle - m->trace_from >= m->trace_window) { \
+        if (pc == m->trace_pc || cycle >= m->trace_end) { \
             data[SREG_AT] = s; \
             if (!trace_on(m, cycle, pc)) \
                 goto leave; \
@@ -72,7 +70,6 @@ static void interpret(struct avr *m, const struct insn *code)
 static void interpret_and_trace(struct avr *m, const struct insn *code)
 {
     INSTRUCTION_LABELS
-    u64 passed;
     INTERPRETER_BEGIN();
     INSTRUCTION_BODIES
     INTERPRETER_END();

@@ -30,7 +30,7 @@ static void apply_input(struct avr *m, u64 at)
 static void apply_event(struct avr *m, u32 event, u64 at)
 {
     m->resting = m->tracing = 0;
-    m->round = 0;
+    m->round = 0, m->counts_until = 0;
     switch (event) {
     case EVENT_INPUT:
         apply_input(m, at);

@@ -42,14 +42,16 @@ FIELDS: Final[tuple[tuple[str, str, int], ...]] = (
     ("fault_address", _U16, 1),
     ("asleep", _U8, 1),  # 0: awake, otherwise sleep mode plus 1
     ("resting", _U8, 1),  # 1: the CPU does nothing before the next event
+    ("counts_until", _U64, 1),  # a countdown ends at this cycle, if no event ends it before
     ("touched", _U8, 1),  # 1: an access in this round depends on time or changes a device
     ("tracing", _U8, 1),  # 1: the interpreter looks for a round that repeats
     ("round", _U32, 1),  # cycles after which the whole state repeats until the next event; 0: unknown
     ("trace_pc", _U16, 1),
     ("trace_from", _U64, 1),
     ("trace_window", _U32, 1),
+    ("trace_end", _U64, 1),  # cycle at which the window is over
     ("trace_failures", _U8, 1),
-    ("trace_after", _U64, 1),  # no new search before this cycle
+    ("trace_after", _U64, 1),  # executed cycles before which no new search begins
     ("trace_data", _U8, DATA_BYTES),  # data memory at trace_from
     ("shadow", _U8, 1),  # 1: one instruction runs before the next interrupt
     ("halted", _U8, 1),  # 1: nothing can wake the CPU
@@ -156,6 +158,7 @@ class Avr(ctypes.Structure):
     skipped: int
     tracing: int
     round: int
+    counts_until: int
     resting: int
     data: ctypes.Array[ctypes.c_uint8]
     flash: ctypes.Array[ctypes.c_uint8]

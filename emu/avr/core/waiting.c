@@ -12,6 +12,7 @@ static void loop_on_itself(struct avr *m)
         halt(m);
         return;
     }
+    m->resting = 1;
     u64 end = m->next_due < m->until ? m->next_due : m->until;
     if (end > m->cycle) {
         u64 rounds = (end - m->cycle + cycles - 1) / cycles;
@@ -51,18 +52,24 @@ static int is_countdown(const struct insn *code, u32 pc)
         return first->op == OP_DEC || (first->op == OP_SBIW && first->k == 1);
     if (first->op != OP_SUBI || first->k != 1)
         return 0;
-    for (const struct insn *i = first + 1; i < branch; i++)
-        if (i->op != OP_SBCI || i->k != 0 || i->d == first->d || (i > first + 1 && i->d <= i[-1].d))
+    u32 used = 1u << first->d;
+    for (const struct insn *i = first + 1; i < branch; i++) {
+        if (i->op != OP_SBCI || i->k != 0 || used >> i->d & 1)
             return 0;
+        used |= 1u << i->d;
+    }
     return 1;
 }
 
-// Pass as many rounds of a countdown as end before `deadline`, and leave one. Return the cycles that pass.
-static u64 count_down(u8 *data, u8 *s, const struct countdown *c, u64 time)
+// At `cycle` the branch of a countdown is taken. Pass as many rounds as end before `deadline`, and leave one.
+// Return the cycles that pass.
+static u64 count_down(struct avr *m, u8 *s, const struct countdown *c, u64 cycle, u64 deadline)
 {
-    u64 value = 0, rounds = time / c->cycles;
+    u8 *const data = m->data;
+    u64 value = 0, rounds = deadline > cycle + 1 ? (deadline - cycle - 1) / c->cycles : 0;
     for (u32 n = 0; n < c->bytes; n++)
         value |= (u64)data[c->registers[n]] << 8 * n;
+    m->counts_until = cycle + value * c->cycles;
     if (value < 2 || !rounds)
         return 0;
     if (rounds > value - 1)
@@ -77,14 +84,23 @@ static u64 count_down(u8 *data, u8 *s, const struct countdown *c, u64 time)
             sub_bytes(s, (u32)((value + 1) >> 8 * n) & 0xFF, n ? 0 : 1, n ? *s & 1u : 0, n ? *s >> 1 & 1u : 1);
     for (u32 n = 0; n < c->bytes; n++)
         data[c->registers[n]] = (u8)(value >> 8 * n);
-    return rounds * c->cycles;
+    u64 passed = rounds * c->cycles;
+    m->skipped += passed, m->trace_end += passed;
+    return passed;
 }
 
 enum { TRACE_LEAST = 1000, TRACE_WINDOW = 256, TRACE_MOST = 16384, TRACE_PAUSE = 16384, TRACE_PAUSES = 8 };
 
+// Windows and pauses of the search count the cycles that are executed one by one.
+static u64 executed(const struct avr *m, u64 cycle)
+{
+    return cycle - m->skipped - m->slept;
+}
+
 static void anchor(struct avr *m, u64 cycle, u32 pc)
 {
     m->trace_from = cycle, m->trace_pc = (u16)pc, m->touched = 0;
+    m->trace_end = cycle + m->trace_window;
     __builtin_memcpy(m->trace_data, m->data, DATA_BYTES);
 }
 
@@ -93,7 +109,7 @@ static int traces(struct avr *m)
 {
     if (m->tracing)
         return 1;
-    if (m->round || m->cycle < m->trace_after || m->next_due - m->cycle < TRACE_LEAST)
+    if (m->round || executed(m, m->cycle) < m->trace_after || m->next_due - m->cycle < TRACE_LEAST)
         return 0;
     m->tracing = 1, m->trace_window = TRACE_WINDOW;
     anchor(m, m->cycle, m->pc);
@@ -108,11 +124,11 @@ static int trace_on(struct avr *m, u64 cycle, u32 pc)
         m->tracing = 0, m->resting = 1, m->trace_failures = 0;
         return 0;
     }
-    if (cycle - m->trace_from < m->trace_window)
+    if (cycle < m->trace_end)
         return 1;
     if (m->trace_window >= TRACE_MOST) { // pause, longer after each failure
         m->tracing = 0;
-        m->trace_after = cycle + ((u64)TRACE_PAUSE << m->trace_failures);
+        m->trace_after = executed(m, cycle) + ((u64)TRACE_PAUSE << m->trace_failures);
         m->trace_failures += m->trace_failures < TRACE_PAUSES;
         return 0;
     }

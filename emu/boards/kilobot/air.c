@@ -9,6 +9,7 @@ typedef i64 (*input_function)(struct avr *m, u64 at, i64 kind, i64 value);
 
 // MARGIN: an instruction may end so many ticks behind the goal of its robot; light up to there is known.
 enum { EDGES = 256, ECHO = 9, MARGIN = 8 };
+enum { LAMP = 0xFFFFFFFF }; // sender of light that no robot sends
 enum { INPUT_ANALOG = 2, CH_HIGH_GAIN = 0, CH_LOW_GAIN = 1, CH_AIN0 = 9 };
 enum { RUN_LIMIT, RUN_FAULT, RUN_HALT, RUN_LOG, RUN_PROGRAM, RUN_LIGHT }; // results of avr_run
 enum { LIT_UV = 1000000, DARK_UV = 0 };
@@ -17,6 +18,7 @@ struct edge {
     u64 at; // ticks
     u32 high_uv, low_uv;
     i32 change; // +1: an emitter is switched on, -1: off
+    u32 sender; // orders edges of one tick
 };
 
 struct link { // what a receiver gets of a sender
@@ -44,16 +46,17 @@ struct air {
     u64 *acts;          // when each robot can send light at the earliest
     run_function run;
     input_function input;
-    u64 delay, random;
+    u64 delay, seed;
     u64 lost_edges; // edges for which a receiver had no room
 };
 
-static u32 draw(struct air *a)
+// A random number for a pulse of a sender at a receiver: the order in which robots run does not matter.
+static u32 draw(const struct air *a, u64 link, u64 pulse)
 {
-    a->random ^= a->random << 13;
-    a->random ^= a->random >> 7;
-    a->random ^= a->random << 17;
-    return (u32)(a->random >> 32);
+    u64 z = a->seed + link * 0x9E3779B97F4A7C15ULL + pulse * 0xD1B54A32D192ED03ULL;
+    z = (z ^ z >> 30) * 0xBF58476D1CE4E5B9ULL;
+    z = (z ^ z >> 27) * 0x94D049BB133111EBULL;
+    return (u32)((z ^ z >> 31) >> 32);
 }
 
 // The robot's cycle at a tick, and the first tick at or after a cycle.
@@ -70,13 +73,15 @@ static u64 tick_of(const struct robot *r, u64 cycle)
     return tick;
 }
 
-// When the robot can send light at the earliest: a sleeping one at its next event.
+// When the robot can send light at the earliest: a waiting one at its next event or at the end of its countdown.
 static u64 acts_at(const struct robot *r)
 {
     const struct avr *m = r->avr;
-    if (!m->resting && !m->halted)
+    u64 counts = m->resting || m->halted ? ~0ULL : m->counts_until;
+    if (counts <= m->cycle)
         return r->reached;
-    u64 wakes = m->next_due == ~0ULL ? m->next_due : tick_of(r, m->next_due);
+    u64 due = m->next_due < counts ? m->next_due : counts;
+    u64 wakes = due == ~0ULL ? due : tick_of(r, due);
     u64 light = r->edge_count ? r->edges[0].at : ~0ULL;
     u64 first = wakes < light ? wakes : light;
     return first > r->reached ? first : r->reached;
@@ -87,6 +92,11 @@ static void note_when_it_acts(struct air *a, const struct robot *r)
     a->acts[r - a->robots] = acts_at(r);
 }
 
+static int is_before(const struct edge *e, const struct edge *other)
+{
+    return e->at != other->at ? e->at < other->at : e->sender < other->sender;
+}
+
 static void add_edge(struct air *a, struct robot *r, struct edge edge)
 {
     if (r->edge_count == EDGES) {
@@ -94,7 +104,7 @@ static void add_edge(struct air *a, struct robot *r, struct edge edge)
         return;
     }
     u32 place = r->edge_count++;
-    while (place && r->edges[place - 1].at > edge.at) {
+    while (place && is_before(&edge, r->edges + place - 1)) {
         r->edges[place] = r->edges[place - 1];
         place--;
     }
@@ -138,10 +148,10 @@ static void emit(struct air *a, i64 sender)
         if (!l->high_uv && !l->low_uv)
             continue;
         if (change > 0)
-            l->hidden = l->loss && (draw(a) & 0xFFFF) < l->loss;
+            l->hidden = l->loss && (draw(a, (u64)(sender * a->count + n), s->pulses) & 0xFFFF) < l->loss;
         if (!l->hidden)
             add_edge(a, a->robots + n,
-                     (struct edge){at + (n == sender ? ECHO : a->delay), l->high_uv, l->low_uv, change});
+                     (struct edge){at + (n == sender ? ECHO : a->delay), l->high_uv, l->low_uv, change, (u32)sender});
     }
     s->avr->light_changed = 0;
 }
@@ -149,8 +159,8 @@ static void emit(struct air *a, i64 sender)
 // Light at one robot that no robot has sent: from tick `at` for `ticks`.
 void air_flash(struct air *a, i64 receiver, i64 at, i64 ticks, i64 high_uv, i64 low_uv)
 {
-    add_edge(a, a->robots + receiver, (struct edge){(u64)at, (u32)high_uv, (u32)low_uv, 1});
-    add_edge(a, a->robots + receiver, (struct edge){(u64)(at + ticks), (u32)high_uv, (u32)low_uv, -1});
+    add_edge(a, a->robots + receiver, (struct edge){(u64)at, (u32)high_uv, (u32)low_uv, 1, LAMP});
+    add_edge(a, a->robots + receiver, (struct edge){(u64)(at + ticks), (u32)high_uv, (u32)low_uv, -1, LAMP});
 }
 
 // Run one robot to tick `goal`. Return 0, or 1 if Python must handle its state (fault, log, new program).
@@ -185,21 +195,27 @@ i64 air_run(struct air *a, i64 until)
         note_when_it_acts(a, a->robots + n);
     for (;;) {
         u64 first = ~0ULL, second = ~0ULL;
-        i64 next = 0;
         for (i64 n = 0; n < a->count; n++) {
             u64 at = a->acts[n];
-            if (at < first)
-                second = first, first = at, next = n;
-            else if (at < second)
-                second = at;
+            u64 later = at < first ? first : at;
+            first = at < first ? at : first;
+            second = later < second ? later : second;
         }
         if (first >= end)
             break;
-        u64 goal = second > end ? end : second + a->delay - MARGIN;
-        int stops = run_robot(a, next, goal < end ? goal : end);
-        note_when_it_acts(a, a->robots + next);
-        if (stops)
-            return next;
+        // Light that is sent from `first` on arrives behind `horizon`. A robot that acts alone may run farther.
+        u64 horizon = first + a->delay - MARGIN, before = horizon, goal = horizon;
+        if (second >= horizon)
+            before = first + 1, goal = second > end ? end : second + a->delay - MARGIN;
+        goal = goal < end ? goal : end;
+        for (i64 n = 0; n < a->count; n++) {
+            if (a->acts[n] >= before)
+                continue;
+            int stops = run_robot(a, n, goal);
+            note_when_it_acts(a, a->robots + n);
+            if (stops)
+                return n;
+        }
     }
     for (i64 n = 0; n < a->count; n++) // none of them sends light before the end
         if (run_robot(a, n, end))

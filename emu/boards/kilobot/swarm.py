@@ -60,7 +60,8 @@ class KilobotFaultError(Exception):
 class _Edge(Structure):
     """`struct edge` of air.c."""
 
-    _fields_ = [("at", c_uint64), ("high_uv", c_uint32), ("low_uv", c_uint32), ("change", c_int32)]
+    _fields_ = [("at", c_uint64), ("high_uv", c_uint32), ("low_uv", c_uint32), ("change", c_int32),
+                ("sender", c_uint32)]  # fmt: skip
 
 
 class _Link(Structure):
@@ -90,7 +91,7 @@ class _Air(Structure):
     """`struct air` of air.c."""
 
     _fields_ = [("count", c_int64), *((name, c_void_p) for name in ("robots", "links", "acts", "run", "input")),
-                ("delay", c_uint64), ("random", c_uint64), ("lost_edges", c_uint64)]  # fmt: skip
+                ("delay", c_uint64), ("seed", c_uint64), ("lost_edges", c_uint64)]  # fmt: skip
     lost_edges: int
 
 

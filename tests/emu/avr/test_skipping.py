@@ -13,8 +13,8 @@ from tests.emu.avr.conftest import Build
 
 PIECE = 3
 """Cycles of a call in which nothing can be skipped: a round of the shortest loop takes as many."""
-SEARCH = {"until", "deadline", "next_due", "skipped", "touched", "tracing", "round", "resting", "log_cycle",
-          "log_register", "log_value"}  # fmt: skip
+SEARCH = {"until", "deadline", "next_due", "skipped", "touched", "counts_until", "tracing", "round", "resting",
+          "log_cycle", "log_register", "log_value"}  # fmt: skip
 """Fields of the calls and of the search for rounds."""
 
 POLLING = """
@@ -41,6 +41,15 @@ COUNTDOWNS = """
             PORTC ^= SREG >> 1 & 8;
         }
     }"""
+DESCENDING = """
+    int main(void) {
+        for (;;) {
+            asm volatile("ldi r18, 200\\n ldi r25, 40\\n ldi r24, 0\\n"
+                         "1: subi r18, 1\\n sbci r25, 0\\n sbci r24, 0\\n brne 1b"
+                         ::: "r18", "r24", "r25");
+            PORTC ^= 1;
+        }
+    }"""
 FLAG = """
     volatile uint8_t ticks, last;
     ISR(TIMER0_OVF_vect) { ticks++; PORTB ^= 1; }
@@ -62,7 +71,7 @@ def state_of(m: Atmega328p) -> dict[str, Any]:
     return found
 
 
-@pytest.mark.parametrize(("text", "least"), [(POLLING, 0.8), (COUNTDOWNS, 0.8), (CLOCKED, 0.0)])
+@pytest.mark.parametrize(("text", "least"), [(POLLING, 0.8), (COUNTDOWNS, 0.8), (DESCENDING, 0.8), (CLOCKED, 0.0)])
 def test_skipping_is_exact(build: Build, text: str, least: float) -> None:
     """Registers, RAM, devices, cycles and pin changes are the same with and without skipping.
 
@@ -96,6 +105,38 @@ def test_interrupts_come_at_their_cycle(build: Build, nops: int) -> None:
         pieces.run_until(pieces.cycle + PIECE)
     assert whole.changes == [change for change in pieces.changes if change.cycle <= whole.cycle]
     assert whole.state.skipped > 45_000
+
+
+def test_waiting_robots_are_not_run_in_turns(build: Build) -> None:
+    """Robots in a delay or in an endless loop pass their time at once, although any of them could send light."""
+    delays = build("#include <util/delay.h>\nint main(void) { for (;;) { _delay_ms(50); PORTC ^= 1; } }")
+    robots = [KilobotSetup(delays, x=40 * n, on_at=0.001 * n, clock=1 + 0.002 * n) for n in range(3)]
+    with KilobotSwarm(robots) as swarm:
+        swarm.run(0.2)
+        assert all(robot.state.skipped > 0.999 * robot.cycle for robot in swarm.robots)
+        assert all(robot.peek(0x28) == 1 for robot in swarm.robots)
+    ended = build("int main(void) { TCCR0B = 5; TIMSK0 = 1; sei(); for (;;) ; } ISR(TIMER0_OVF_vect) { PORTC++; }")
+    with KilobotSwarm([KilobotSetup(ended, x=40 * n) for n in range(3)]) as swarm:
+        swarm.run(0.2)
+        assert all(robot.state.skipped > 0.999 * robot.cycle for robot in swarm.robots)
+        assert all(robot.peek(0x28) == 6 for robot in swarm.robots)
+
+
+def test_a_delay_does_not_stop_the_search(build: Build) -> None:
+    """A delay that is no round does not count as failed search: the loop behind it is skipped at once."""
+    m = Atmega328p(build("""
+        #include <util/delay.h>
+        volatile uint8_t ticks, seen; volatile uint16_t ms;
+        ISR(TIMER0_OVF_vect) { ticks++; }
+        int main(void) {
+            TCCR0B = 5; TIMSK0 = 1; sei();
+            for (;;) {
+                for (ms = 0; ms < 500; ms++) _delay_ms(1);
+                for (seen = ticks; (uint8_t)(ticks - seen) < 4; ) ;
+            }
+        }"""))  # fmt: skip
+    m.run_until(12_000_000)
+    assert m.state.skipped > 0.99 * m.cycle
 
 
 def test_a_fed_watchdog_does_not_bite(build: Build) -> None:
