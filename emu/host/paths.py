@@ -51,6 +51,11 @@ def headers() -> Path:
     return cache() / "headers"
 
 
+def front_end_results() -> Path:
+    """Return the cache folder of the IR of C files (`toolchain cc -fcache-ir`), which is at most 64 MB large."""
+    return cache() / "ir"
+
+
 def images() -> Path:
     """Return the cache folder of the `firmware/apps` images that `arena run` builds for an installed package."""
     return cache() / "firmware"

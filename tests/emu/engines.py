@@ -98,7 +98,7 @@ class NoCache(ObjectCache):
     def get(self, key: str) -> bytes | None:
         return None
 
-    def put(self, key: str, code: bytes) -> None:
+    def put(self, key: str, content: bytes) -> None:
         """Ignore the code."""
 
 

@@ -1,6 +1,6 @@
 """Fixtures that build firmware images, each once per test run, in a temporary folder.
 
-Images of one run share the IR of kernel and drivers (shared_front_end.py).
+Images share the IR of kernel and drivers in the cache (`toolchain cc -fcache-ir`).
 """
 
 from __future__ import annotations
@@ -21,7 +21,6 @@ from tests.watchdog import HANG
 ROOT = Path(__file__).resolve().parents[2]
 FIRMWARE = ROOT / "firmware"
 TARGET_APPS = Path(__file__).parent / "target"
-FRONT_END = Path(__file__).with_name("shared_front_end.py")
 
 Build = Callable[..., Path]
 
@@ -41,20 +40,18 @@ def folder_of_run(factory: pytest.TempPathFactory) -> Path:
 
 
 def make_once(factory: pytest.TempPathFactory, name: str, product: str, folder: Path, *words: str) -> Path:
-    """Run `make` once for all worker processes of a test run, with `OUT` set, and return its product in that folder."""
+    """Make a product in a folder OUT once for all worker processes of a test run, and return its path."""
     out = folder_of_run(factory) / f"{name}-{hashlib.sha256(repr(words).encode()).hexdigest()[:16]}"
     with out.with_suffix(".lock").open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
         if not (out / product).exists():
-            run_make(folder, f"OUT={out}", *words)
+            run_make(folder, f"OUT={out}", *words, str(out / product))
     return out / product
 
 
 def built_once(factory: pytest.TempPathFactory, app: str, *words: str) -> Path:
     """Build an application for the e-puck once for all worker processes of a test run."""
-    python = f"{sys.executable} {FRONT_END} {folder_of_run(factory) / 'front-end'}"
-    words = (f"APP={app}", f"PYTHON={python}", *words)
-    return make_once(factory, app, "firmware.elf", FIRMWARE, *words)
+    return make_once(factory, app, "firmware.elf", FIRMWARE, f"APP={app}", f"PYTHON={sys.executable}", *words)
 
 
 @pytest.fixture(scope="session")

@@ -23,6 +23,7 @@ from toolchain.frontend.options import HELP, CcOptions, Input, parse
 if TYPE_CHECKING:
     from toolchain.asm.state import Options as AssemblerOptions
     from toolchain.driver.link_stage import LinkInput
+    from toolchain.frontend.clang import Job
 
 FrontEnd = Callable[[CcOptions, Path], dict[Input, bytes]]
 IR_SOURCES = {"c", "cpp-output", "c++", "c++-cpp-output"}
@@ -116,28 +117,59 @@ def _preprocess(options: CcOptions) -> None:
 
 def front_end(options: CcOptions, scratch: Path) -> dict[Input, bytes]:
     """Unoptimised IR of every input except assembly and objects. All C files are compiled before an error is raised."""
-    from toolchain.abi.struct_alignment import mark
     from toolchain.driver.whole_program import is_bitcode
-    from toolchain.frontend import short_double
-    from toolchain.frontend.clang import ir_job, run_jobs, with_i32_levels
-    from toolchain.frontend.externally_initialised import mark_externally_initialised
+    from toolchain.frontend.clang import ir_job
 
     sources = [item for item in options.inputs if item.language in IR_SOURCES]
-    targets = {item: scratch / f"{number}.front.ll" for number, item in enumerate(sources)}
-    if targets:
-        run_jobs([ir_job(options, item, target) for item, target in targets.items()], options.jobs, options.verbose)
+    jobs = {item: ir_job(options, item, scratch / f"{number}.front.ll") for number, item in enumerate(sources)}
+    compiled = _compile(options, jobs)
     modules: dict[Input, bytes] = {}
     for item in options.inputs:
-        if item in targets:
-            layouts = targets[item].with_suffix(".layouts").read_text(errors="replace")
-            text = with_i32_levels(targets[item].read_bytes())
-            text = short_double.rename(text) if options.short_double else text
-            modules[item] = mark(mark_externally_initialised(text), layouts)
+        if item in compiled:
+            modules[item] = compiled[item]
         elif item.language in ("ir", "object"):
             content = read_bytes(item.path)
             if item.language == "ir" or is_bitcode(content):
                 modules[item] = content
     return modules
+
+
+def _compile(options: CcOptions, jobs: dict[Input, Job]) -> dict[Input, bytes]:
+    """IR of the sources of front-end jobs; with -fcache-ir, that of unchanged C files is read from the cache."""
+    from toolchain.driver.ir_cache import IrCache, dependency_flags, is_cacheable
+    from toolchain.frontend.clang import run_jobs
+
+    if not jobs:
+        return {}
+    cached = {item: job for item, job in jobs.items() if is_cacheable(options, item)}
+    if not cached:
+        run_jobs(list(jobs.values()), options.jobs, options.verbose)
+        return {item: _ir_of(options, job) for item, job in jobs.items()}
+    cache = IrCache()
+    found = {item: ir for item, job in cached.items() if (ir := cache.find(job)) is not None}
+    rules = {item: job.output.with_suffix(".d") for item, job in cached.items()}
+    missing = {item: job for item, job in jobs.items() if item not in found}
+    described = [replace(job, arguments=[*dependency_flags(rules[item]), *job.arguments]) if item in cached else job
+                 for item, job in missing.items()]  # fmt: skip
+    quiet = run_jobs(described, options.jobs)
+    for (item, job), is_quiet in zip(missing.items(), quiet, strict=True):
+        found[item] = _ir_of(options, job)
+        if item in cached and is_quiet:
+            cache.add(job, rules[item].read_text(), found[item])
+    return found
+
+
+def _ir_of(options: CcOptions, job: Job) -> bytes:
+    """IR of the source of a front-end job that has run."""
+    from toolchain.abi.struct_alignment import mark
+    from toolchain.frontend import short_double
+    from toolchain.frontend.clang import with_i32_levels
+    from toolchain.frontend.externally_initialised import mark_externally_initialised
+
+    layouts = job.output.with_suffix(".layouts").read_text(errors="replace")
+    text = with_i32_levels(job.output.read_bytes())
+    text = short_double.rename(text) if options.short_double else text
+    return mark(mark_externally_initialised(text), layouts)
 
 
 def optimise(options: CcOptions, ir: bytes, scratch: Path) -> str:

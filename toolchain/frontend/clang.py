@@ -91,6 +91,11 @@ class Job:
     printed: Path | None = None  # file that receives its standard output
     chip: Chip = field(default_factory=chip_named)
 
+    @property
+    def output(self) -> Path:
+        """The file behind -o, which ends the arguments of a job with an output file."""
+        return Path(self.arguments[-1])
+
 
 def clang_program() -> list[str]:
     """Command prefix that runs clang. Raises ToolError if the `ziglang` package is missing."""
@@ -290,10 +295,11 @@ def without_preprocessing(options: list[str]) -> list[str]:
     return out
 
 
-def run_jobs(jobs: list[Job], parallel: int, show: bool = False) -> None:
+def run_jobs(jobs: list[Job], parallel: int, show: bool = False) -> list[bool]:
     """Run jobs, at most `parallel` at once (0: one per core); diagnostics appear in the order of the jobs.
 
-    With `show`, the commands are printed first. Raises ClangError after the last job if any of them failed.
+    Return whether each job had no diagnostics. With `show`, the commands are printed first. Raises ClangError after the
+    last job if any of them failed.
     """
     program = clang_program()
     colour = ["-fdiagnostics-color=always"] if os.isatty(2) and not os.environ.get("NO_COLOR") else []
@@ -316,3 +322,4 @@ def run_jobs(jobs: list[Job], parallel: int, show: bool = False) -> None:
             job.printed.write_bytes(result.stdout)
     if any(result.returncode != 0 for result in results):
         raise ClangError
+    return [not result.stderr for result in results]

@@ -161,6 +161,7 @@ SECTIONS: list[tuple[str, list[tuple[str, str, str]]]] = [
         ("-finstrument-functions", CLANG, ""), ("-pg", REFUSED, "use the emulator's profiler"),
         ("-f[no-]sanitize=<list>", CLANG, "a violation stops at a breakpoint"),
         ("-f[no-]verify-machine", DRIVER, "check the code after every pass"),
+        ("-f[no-]cache-ir", DRIVER, "reuse the IR of unchanged C files"),
         ("-ftemplate-<name>", CLANG, ""), ("-fconstexpr-<name>", CLANG, ""), ("-fbracket-depth=<n>", CLANG, ""),
     ]),
     ("Preprocessor", [

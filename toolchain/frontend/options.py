@@ -51,6 +51,7 @@ C compiler, assembler and linker for the dsPIC30F6014A and its relatives (-mcpu=
   -Map FILE             link map;  -Wl,OPTION and -Xlinker OPTION pass options to the linker
   -T FILE               accepted for the device's own linker script p30F6014A.gld, whose memory map is built in
   -Wa,OPTION and -Xassembler OPTION pass options to the assembler
+  -fcache-ir            keep the IR of each C file in the cache, and reuse it while file, headers and flags are the same
   -j N                  parallel front-end jobs (default: one per core)
   -save-temps           keep PROGRAM.ll and PROGRAM.s in the folder of the output
   -v  --version  --help
@@ -119,6 +120,7 @@ class CcOptions:
     runtime: bool = True
     startup: bool = True
     jobs: int = 0
+    cache_ir: bool = False
     save_temps: bool = False
     verbose: bool = False
     action: str = "compile"
@@ -267,6 +269,8 @@ def _code_generation(options: CcOptions, word: str) -> bool:
         options.debug = word != "-g0"
     elif word.startswith(("-flto", "-fno-lto")):
         options.lto = word.startswith("-flto")
+    elif word in ("-fcache-ir", "-fno-cache-ir"):
+        options.cache_ir = word == "-fcache-ir"
     elif word in ("-fverify-machine", "-fno-verify-machine"):
         options.verify = word == "-fverify-machine"
     elif word in ("-fshort-double", "-fno-short-double"):

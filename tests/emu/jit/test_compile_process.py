@@ -18,9 +18,10 @@ from straight_body import Shape
 from straight_firmware import straight_firmware
 
 from emu.dspic30f.jit import compiler as compiler_module
-from emu.dspic30f.jit.cache import SHELVES, ObjectCache
+from emu.dspic30f.jit.cache import ObjectCache
 from emu.dspic30f.jit.compiler import MAX_DEATHS, Compiler, LoadedCode
 from emu.dspic30f.jit.engine import JitEngine
+from emu.host.disk_cache import SHELVES
 from emu.machine.machine import Machine
 from tests.watchdog import HANG
 

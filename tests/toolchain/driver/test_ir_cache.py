@@ -1,0 +1,126 @@
+"""IR of unchanged C files from the cache (`cc -fcache-ir`)."""
+
+from __future__ import annotations
+
+import os
+import time
+from pathlib import Path
+
+import pytest
+
+from tests.toolchain.c_programs import build
+from toolchain.driver import driver, ir_cache
+from toolchain.frontend import clang
+
+MAIN = '#include "size.h"\n#include <limit.h>\nint other(int);\nint main(void) { return other(SIZE); }\n'
+BOTH = ["main.c", "other.c"]
+
+
+class Compiled:
+    """Builds a program of two C files with -fcache-ir and counts the files that clang compiles."""
+
+    def __init__(self, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.folder = folder
+        self.runs: list[str] = []
+        original = clang.run_jobs
+
+        def run_jobs(jobs: list[clang.Job], parallel: int, show: bool = False) -> list[bool]:
+            self.runs += [job.source.name for job in jobs if job.source.suffix == ".c"]
+            return original(jobs, parallel, show)
+
+        monkeypatch.setattr(clang, "run_jobs", run_jobs)
+        monkeypatch.setattr(ir_cache, "front_end_results", lambda: folder / "cache" / "ir")
+        self.write("main.c", MAIN)
+        self.write("other.c", "int other(int x) { return x + 1; }\n")
+        self.write("late/limit.h", "#define LIMIT 4\n")
+        self.write("late/size.h", "#define SIZE LIMIT\n")
+        (folder / "early").mkdir()
+
+    def write(self, name: str, text: str) -> None:
+        """Write a file that is older than the run, as a file is that a user has saved before the build."""
+        path = self.folder / name
+        path.parent.mkdir(exist_ok=True)
+        path.write_text(text)
+        os.utime(path, (time.time() - 60,) * 2)
+
+    def __call__(self, *options: str) -> tuple[list[str], bytes]:
+        """Build; return the names of the compiled C files and the image."""
+        self.runs.clear()
+        folders = [f"-I{self.folder / name}" for name in ("early", "late")]
+        sources = [self.folder / name for name in BOTH]
+        built = build(sources, self.folder / "a.elf", "-fcache-ir", "-Os", "-g", *folders, *options)
+        assert built.status == 0, built.messages
+        return sorted(self.runs), (self.folder / "a.elf").read_bytes()
+
+
+@pytest.fixture
+def compiled(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Compiled:
+    return Compiled(tmp_path, monkeypatch)
+
+
+def test_only_changed_files_are_compiled(compiled: Compiled) -> None:
+    """A changed source, header or flag, and a header that clang finds earlier; the image is that of a full build."""
+    first = compiled()
+    assert first[0] == BOTH
+    assert compiled() == ([], first[1])
+    compiled.write("other.c", "int other(int x) { return x + 2; }\n")
+    assert compiled()[0] == ["other.c"]
+    compiled.write("late/limit.h", "#define LIMIT 5\n")
+    changed = compiled()
+    assert changed[0] == ["main.c"]
+    assert changed[1] == compiled("-fno-cache-ir")[1] != first[1]
+    compiled.write("early/size.h", "#define SIZE 6\n")
+    assert compiled()[0] == ["main.c"]
+    compiled.write("limit.h", "#error not found by <limit.h>\n")
+    assert compiled()[0] == ["main.c"]
+    assert compiled("-DADDED")[0] == BOTH
+    assert compiled("-DADDED")[0] == []
+    (compiled.folder / "early/size.h").unlink()
+    assert compiled()[1] == changed[1]
+
+
+@pytest.mark.parametrize("text", [
+    "int other(int x) { return x + __TIME__[0]; }\n",
+    '#if __has_include("absent.h")\n#error\n#endif\nint other(int x) { return x; }\n',
+    "int other(int x) { int unused; return x; }\n",
+])  # fmt: skip
+def test_a_file_that_varies_or_has_warnings_is_compiled_each_time(compiled: Compiled, text: str) -> None:
+    compiled.write("other.c", text)
+    assert compiled("-Wall")[0] == BOTH
+    assert compiled("-Wall")[0] == ["other.c"]
+
+
+def test_a_file_changed_during_the_run_is_not_cached(compiled: Compiled) -> None:
+    (compiled.folder / "late/limit.h").touch()
+    os.utime(compiled.folder / "late/limit.h", (time.time() + 60,) * 2)
+    assert compiled()[0] == BOTH
+    assert compiled()[0] == ["main.c"]
+
+
+def test_the_prefix_of_other_folders_does_not_matter(compiled: Compiled) -> None:
+    """-ffile-prefix-map= of a folder in which no source, header or search folder lies."""
+    assert compiled("-ffile-prefix-map=/absent/one=x")[0] == BOTH
+    assert compiled("-ffile-prefix-map=/absent/two=x")[0] == []
+    assert compiled(f"-ffile-prefix-map={compiled.folder}/=")[0] == BOTH
+
+
+def test_a_damaged_cache_is_not_used(compiled: Compiled) -> None:
+    first = compiled()
+    for path in (compiled.folder / "cache" / "ir").glob("*/*"):
+        path.write_bytes(path.read_bytes()[:-1])
+    assert compiled() == first
+
+
+def test_dependency_files_are_written_each_time(compiled: Compiled, tmp_path: Path) -> None:
+    for _ in range(2):
+        built = build([tmp_path / "main.c"], tmp_path / "main.o", "-fcache-ir", "-c", "-MD", f"-I{tmp_path / 'late'}")
+        assert built.status == 0, built.messages
+        assert "limit.h" in (tmp_path / "main.d").read_text()
+        (tmp_path / "main.d").unlink()
+
+
+def test_errors_are_reported_each_time(compiled: Compiled, capfd: pytest.CaptureFixture[str]) -> None:
+    compiled.write("other.c", "int other(int x) { return y; }\n")
+    for _ in range(2):
+        assert driver.main(["-fcache-ir", "-c", str(compiled.folder / "other.c")]) == 1
+        assert "undeclared identifier 'y'" in capfd.readouterr().err

@@ -1,0 +1,161 @@
+"""IR of unchanged C files from the cache (-fcache-ir).
+
+The key of an entry is the hash of the compiler, the folder, the flags, and the source file with its content. The entry
+names the headers that clang read, with their hashes. It also names the files that would be other headers of the same
+name: a new file there could be the one that clang reads instead. An entry is valid while nothing of this differs.
+
+Not cached: sources with messages, dependency files (-MD), and sources or headers whose meaning depends on the time or
+on the existence of other files (`__TIME__`, `__has_include`).
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import re
+import time
+import zlib
+from collections.abc import Iterable
+from itertools import pairwise
+from pathlib import Path
+from typing import Final
+
+from emu.host.disk_cache import DiskCache
+from emu.host.paths import front_end_results
+from toolchain.driver.runtime_archive import fingerprint
+from toolchain.frontend.clang import INCLUDE_DIR, Job, builtin_include_dir
+from toolchain.frontend.options import CcOptions, Input
+
+LIMIT_BYTES: Final = 64 << 20
+COMPRESSION: Final = 1
+"""Level of zlib: the fastest."""
+VARYING: Final = (b"__DATE__", b"__TIME__", b"__TIMESTAMP__", b"__has_include", b"__has_embed")
+"""Words of a source whose meaning depends on more than the content of files."""
+PREFIX_MAP: Final = re.compile(r"-f(?:file|debug|macro)-prefix-map=([^=]*)=")
+SEARCH_FLAGS: Final = ("-I", "-iquote", "-isystem", "-idirafter")
+ENVIRONMENT: Final = ("CPATH", "C_INCLUDE_PATH", "SOURCE_DATE_EPOCH")
+DEPENDENCY: Final = re.compile(r"(?:\\[^\n]|[^\s\\])+")
+OWN_HEADERS: Final = (str(INCLUDE_DIR), str(builtin_include_dir()))
+"""Folders whose headers test only for each other's existence."""
+
+
+class IrCache:
+    """IR of the C files of one run of the driver. Files are read at most once for all of them."""
+
+    def __init__(self) -> None:
+        compiler = fingerprint().encode()
+        self.store: Final = DiskCache(front_end_results(), LIMIT_BYTES, lambda: compiler)
+        self._varies: dict[str, bool] = {}
+        self._hashes: dict[str, str | None] = {}
+        self._present: dict[str, bool] = {}
+        self._here: Final = os.getcwd()
+        self._started: Final = time.time()
+
+    def find(self, job: Job) -> bytes | None:
+        """Return the IR of the source of a front-end job; None if there is no valid entry."""
+        entry = self.store.get(self._key(job))
+        if entry is None:
+            return None
+        head, _, packed = entry.partition(b"\n")
+        record = json.loads(head)
+        if any(self._hash(path) != digest for path, digest in record["headers"].items()):
+            return None
+        if self._others(record["headers"], record["folders"], record["names"]) != record["others"]:
+            return None
+        return zlib.decompress(packed)
+
+    def add(self, job: Job, dependencies: str, ir: bytes) -> None:
+        """Store the IR of a job; `dependencies` is the rule that clang's -MD has written.
+
+        A file that has changed since the run began is not what clang has read; then nothing is stored.
+        """
+        read = {_unescaped(word) for word in DEPENDENCY.findall(dependencies.partition(":")[2])} | {str(job.source)}
+        headers = sorted(read - {str(job.source)})
+        hashes = {path: self._hash(path) for path in headers}
+        if None in hashes.values() or any(os.stat(path).st_mtime >= self._started for path in read):
+            return
+        if any(self._is_varying(path) for path in read):
+            return
+        if any(self._begins_with(path, old) for old in self._unused_maps(job) for path in headers):
+            return
+        folders = sorted({os.path.dirname(path) or "." for path in read} | set(_search_folders(job)))
+        names = {path[len(folder) + 1 :] for folder in folders for path in headers if path.startswith(f"{folder}/")}
+        names |= {os.path.basename(path) for path in headers}
+        record = {"headers": hashes, "folders": folders, "names": sorted(names),
+                  "others": self._others(headers, folders, sorted(names))}  # fmt: skip
+        self.store.put(self._key(job), json.dumps(record).encode() + b"\n" + zlib.compress(ir, COMPRESSION))
+
+    def _key(self, job: Job) -> str:
+        """Return the key of a job without the paths of its outputs."""
+        unused = self._unused_maps(job)
+        *given, _, _ = job.arguments  # without -o OUTPUT
+        words = [word for word in given if not ((found := PREFIX_MAP.match(word)) and found[1] in unused)]
+        environment = [f"{name}={os.environ.get(name)}" for name in ENVIRONMENT]
+        text = "\0".join([self._here, job.chip.name, *environment, *words])
+        return self.store.key(text.encode(errors="surrogateescape"), _content(str(job.source)))
+
+    def _unused_maps(self, job: Job) -> set[str]:
+        """Return the prefixes of -ffile-prefix-map= that no path of the job has, unless a header has one."""
+        prefixes = {found[1] for word in job.arguments if (found := PREFIX_MAP.match(word))}
+        used = [self._here, str(job.source), *_search_folders(job)]
+        return {old for old in prefixes if not any(self._begins_with(path, old) for path in used)}
+
+    def _begins_with(self, path: str, old: str) -> bool:
+        """Whether a path, absolute or as it is written, begins with a text."""
+        return path.startswith(old) or os.path.join(self._here, path).startswith(old)
+
+    def _others(self, headers: Iterable[str], folders: list[str], names: list[str]) -> list[str]:
+        """Return the existing files that have the name of a header in another folder."""
+        known = set(headers)
+        paths = [f"{folder}/{name}" for folder in folders for name in names]
+        return [path for path in paths if path not in known and self._is_present(path)]
+
+    def _is_varying(self, path: str) -> bool:
+        """Whether the meaning of a file depends on the time or on the existence of files."""
+        found = self._varies.get(path)
+        if found is None:
+            content = b"" if path.startswith(OWN_HEADERS) else _content(path)
+            found = self._varies[path] = any(word in content for word in VARYING)
+        return found
+
+    def _is_present(self, path: str) -> bool:
+        found = self._present.get(path)
+        if found is None:
+            found = self._present[path] = os.path.exists(path)
+        return found
+
+    def _hash(self, path: str) -> str | None:
+        if path not in self._hashes:
+            content = _content(path)
+            self._hashes[path] = hashlib.sha256(content).hexdigest() if content or os.path.isfile(path) else None
+        return self._hashes[path]
+
+
+def is_cacheable(options: CcOptions, item: Input) -> bool:
+    """Whether -fcache-ir concerns an input: a C file, without dependency files and printed commands."""
+    return options.cache_ir and item.language == "c" and not options.dependency and not options.verbose
+
+
+def dependency_flags(output: Path) -> list[str]:
+    """Return the flags by which a front-end job writes the names of its headers to a file."""
+    return ["-MD", "-MF", str(output), "-MT", "ir"]
+
+
+def _search_folders(job: Job) -> list[str]:
+    """Return the folders of the options of a job in which clang searches headers."""
+    words = job.arguments
+    folders = [after for word, after in pairwise(words) if word in SEARCH_FLAGS]
+    return folders + [word[2:] for word in words if word.startswith("-I") and len(word) > 2]
+
+
+def _unescaped(word: str) -> str:
+    """Return a path of a dependency file as it is on disk."""
+    return re.sub(r"\\([\s#\\])", r"\1", word).replace("$$", "$")
+
+
+def _content(path: str) -> bytes:
+    try:
+        return Path(path).read_bytes()
+    except OSError:
+        return b""
