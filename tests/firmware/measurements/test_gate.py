@@ -15,7 +15,7 @@ import pytest
 from emu.cli import main
 
 HERE = Path(__file__).parent
-SOURCE = HERE / "ferry" / "main.c"
+SOURCE = HERE / "gate" / "main.c"
 SECONDS = "0.05"
 FOOTPRINT = ["footprint", "--seconds", SECONDS]
 CYCLES = ["cycles", "--seconds", SECONDS, "--function", "weigh"]
@@ -157,13 +157,13 @@ def built(image, tmp_path_factory):
 
     def build(changes: tuple[Change, ...]) -> tuple[str, str]:
         folder = tmp_path_factory.mktemp("apps")
-        shutil.copytree(SOURCE.parent, folder / "ferry")
+        shutil.copytree(SOURCE.parent, folder / "gate")
         text = SOURCE.read_text()
         for change in changes:
             assert text.count(change.old) == 1, change.old
             text = text.replace(change.old, change.new)
-        (folder / "ferry" / "main.c").write_text(text)
-        return str(image("ferry", folder)), text
+        (folder / "gate" / "main.c").write_text(text)
+        return str(image("gate", folder)), text
 
     return build
 

@@ -1,4 +1,4 @@
-/* An application in which the test of the gate plants regressions and harmless changes (test_gate.py). */
+/* The application of test_gate.py, which plants regressions and harmless changes in it: a ferry with crates. */
 #include <openswarm.h>
 #include <openswarm_cleanup.h>
 #include <openswarm_interrupt.h>
