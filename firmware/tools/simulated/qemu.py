@@ -23,6 +23,8 @@ from firmware.tools.simulated.machine import NotInstalled, Stopped, Symbols
 
 PATIENCE = 60.0
 """Host time limit of one run in seconds."""
+MOST_BYTES = 2000
+"""Bytes of memory in one answer of QEMU's gdb stub, whose packets have at most 4,096 characters."""
 
 
 @dataclass(frozen=True)
@@ -217,7 +219,10 @@ class Qemu:
         return self.pc
 
     def peek_bytes(self, address: int, count: int) -> bytes:
-        return bytes.fromhex(self._ask(f"m{address:x},{count:x}"))
+        sizes = [min(MOST_BYTES, count - done) for done in range(0, count, MOST_BYTES)]
+        places = range(address, address + count, MOST_BYTES)
+        parts = (self._ask(f"m{place:x},{size:x}") for place, size in zip(places, sizes, strict=True))
+        return bytes.fromhex("".join(parts))
 
     def poke_bytes(self, address: int, data: bytes) -> None:
         if self._ask(f"M{address:x},{len(data):x}:{data.hex()}") != "OK":

@@ -20,8 +20,9 @@ from tests.firmware.model.calls import CALLS
 from tests.firmware.model.compare import Kernels, build, random_programs
 from tests.firmware.model.faults import FAULTS, FOUND_BY, plant
 from tests.firmware.model.generator import MOST_CALLS, Generator
-from tests.firmware.model.on_target import DEFINES, Robot, small_programs
+from tests.firmware.model.on_target import DEFINES, DEFINES_IN_QEMU, Comparison, CpuInQemu, Robot, small_programs
 from tests.firmware.model.program import Program, named_texts
+from tests.firmware.ports.targets import BOARDS, in_qemu, make
 from tests.fuzz.seeds import base_seed
 
 PROGRAMS = 600
@@ -148,8 +149,8 @@ def test_planted_faults_are_found(built: Path, tmp_path: Path) -> None:
     check_all(check, range(base_seed() % 4, len(FAULTS), 4))
 
 
-def check_on_robot(robot: Robot, program: Program) -> None:
-    difference = robot.difference(program)
+def check_on(machine: Comparison, program: Program) -> None:
+    difference = machine.difference(program)
     assert difference is None, f"{program}\n{difference}"
 
 
@@ -157,8 +158,19 @@ def check_on_robot(robot: Robot, program: Program) -> None:
 def test_programs_agree_on_the_robot(image: Build) -> None:
     """Programs that the commit determines agree with the model on the emulated dsPIC30F, too."""
     robot = Robot(image("model", TARGET_APPS, f"DEFINES={DEFINES}"))
-    check_all(partial(check_on_robot, robot), small_programs(base_seed(), 15))
+    check_all(partial(check_on, robot), small_programs(base_seed(), 15))
     assert robot.compared > 7
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("target", BOARDS)
+def test_programs_agree_in_qemu(target: str, tmp_path: Path) -> None:
+    """Programs that the commit determines agree with the model on the Cortex-M4 and on the RISC-V, too."""
+    image = make(target, "model", tmp_path, f"DEFINES={DEFINES_IN_QEMU}", apps=TARGET_APPS)
+    in_qemu(target, image).close()  # skips if QEMU is missing
+    machine = CpuInQemu(BOARDS[target], image)
+    check_all(partial(check_on, machine), small_programs(base_seed() + 1, 15))
+    assert machine.compared > 7
 
 
 def test_the_readme_states_every_planted_fault() -> None:

@@ -1,11 +1,17 @@
-"""Runs programs on the emulated dsPIC30F, whose timers stand still: the clock ticks when the kernel idles."""
+"""Runs programs on the emulated dsPIC30F and on CPUs in QEMU, whose timers stand still.
+
+The clock ticks when the kernel idles.
+"""
 
 from __future__ import annotations
 
+from contextlib import closing
 from pathlib import Path
 from random import Random
 
 import emu
+from firmware.tools.simulated.machine import Stopped, peek, poke_words
+from firmware.tools.simulated.qemu import Board, Qemu
 from tests.firmware.model.compare import Difference
 from tests.firmware.model.executor import Executor
 from tests.firmware.model.generator import FAMILIES, Generator
@@ -17,7 +23,8 @@ DEFINES = "-U__OPTIMIZE__ -DSYS_HEAP=4400 -DSYS_DEFAULT_STACK=400"
 """Stacks for the interpreter: without __OPTIMIZE__ the port gives the kernel a longer one."""
 PATIENCE = 3_000_000
 """Tcy after which a program that ends neither by its records nor by idling has hung."""
-HEAP = 3500
+DEFINES_IN_QEMU = "-DSYS_DEFAULT_STACK=1024 -Wl,--wrap=hal_idle"
+HEAP, HEAP_IN_QEMU = 3500, 24_000
 """Heap bytes beyond which a program is not compared: the model does not know which block fits where."""
 OF_A_PORT = (Code.UNUSED_STACK, Code.UNUSED_KERNEL_STACK)
 """Calls whose results depend on what a port leaves of its stacks."""
@@ -30,8 +37,35 @@ def small_programs(seed: int, count: int) -> list[Program]:
     return [Generator(random, random.sample(families, random.choice((2, 3, 4))), 0).program() for _ in range(count)]
 
 
-class Robot:
-    """The emulated robot at the start of main."""
+class Comparison:
+    """A machine that runs programs, and compares them with the model."""
+
+    sizes: Sizes
+    heap = HEAP
+    base = 0
+    """Heap bytes in use when a program starts."""
+    compared = 0
+    """Programs that fitted into the heap."""
+
+    def run(self, program: Program, most: int) -> list[Record]:
+        """Run a program and return at most its first `most` records."""
+        raise NotImplementedError
+
+    def difference(self, program: Program) -> Difference | None:
+        """Return how the machine's records differ from the model's, without the final state."""
+        executor = Executor(program, self.sizes)
+        wanted = [r for r in executor.run(self.base) if r[1] != Kind.FINAL]
+        if executor.k.peak > self.heap:
+            return None
+        seen = comparable(self.run(program, len(wanted)))
+        if out_of_memory(seen) > out_of_memory(wanted):  # a fragmented heap, which the model does not know
+            return None
+        self.compared += 1
+        return None if seen == comparable(wanted) else Difference(0, seen, comparable(wanted))
+
+
+class Robot(Comparison):
+    """The emulated dsPIC30F."""
 
     def __init__(self, image: Path) -> None:
         self.machine = emu.load(image)
@@ -41,11 +75,9 @@ class Robot:
         self.sizes = Sizes(*(self.machine.peek(at + 2 * i) for i in range(len(Sizes.__dataclass_fields__))))
         self.records: list[Record] = []
         self.idles = 0
-        self.compared = 0
-        """Programs that fitted into the heap."""
         self.machine.hook_pc("machine_record", self.on_record)
         self.machine.hook_pc("hal_idle", self.on_idle)
-        self.base = self.run(Program())[0][7]
+        self.base = self.run(Program(), 1)[0][7]
 
     def on_record(self, *_: object) -> None:
         self.records.append(RECORD.unpack(self.machine.peek_bytes(self.machine.w[0], RECORD.size)))
@@ -55,8 +87,7 @@ class Robot:
         if not self.machine.peek("os_pending") & OS_WORK:
             self.machine.write("IFS0", self.machine.read("IFS0") | T1IF)
 
-    def run(self, program: Program) -> list[Record]:
-        """Run a program and return its records up to a limit."""
+    def run(self, program: Program, most: int) -> list[Record]:
         machine = self.machine
         machine.restore(self.start)
         self.records, self.idles = [], 0
@@ -64,23 +95,40 @@ class Robot:
         for offset, byte in enumerate(program.encoded()):
             machine.poke(at + offset, byte, 1)
         start = machine.cycle
-        while len(self.records) < LIMITS["MOST_RECORDS"] and self.idles < LIMITS["MOST_IDLES"]:
+        while len(self.records) < most and self.idles < LIMITS["MOST_IDLES"]:
             stop = machine.run(cycles=20_000)
             if stop.reason != "limit" or machine.cycle > start + PATIENCE:
                 break
-        return self.records[: LIMITS["MOST_RECORDS"]]
+        return self.records[:most]
 
-    def difference(self, program: Program) -> Difference | None:
-        """Return how the robot's records differ from the model's, without the final state."""
-        executor = Executor(program, self.sizes)
-        wanted = [r for r in executor.run(self.base) if r[1] != Kind.FINAL]
-        if executor.k.peak > HEAP:
-            return None
-        seen = comparable(self.run(program)[: len(wanted)])
-        if out_of_memory(seen) > out_of_memory(wanted):  # a fragmented heap, which the model does not know
-            return None
-        self.compared += 1
-        return None if seen == comparable(wanted) else Difference(0, seen, comparable(wanted))
+
+class CpuInQemu(Comparison):
+    """A CPU in QEMU, which starts once per program. Raises NotInstalled."""
+
+    heap = HEAP_IN_QEMU
+
+    def __init__(self, board: Board, image: Path) -> None:
+        self.board, self.image = board, image
+        with closing(self.started()) as machine:
+            self.sizes = Sizes(*(peek(machine, "port_sizes", 2 * i) for i in range(len(Sizes.__dataclass_fields__))))
+        self.base = self.run(Program(), 1)[0][7]
+
+    def started(self) -> Qemu:
+        """Return a CPU that waits for its program."""
+        machine = Qemu(self.board, self.image)
+        machine.run_to("machine_ready")
+        return machine
+
+    def run(self, program: Program, most: int) -> list[Record]:
+        with closing(self.started()) as machine:
+            machine.poke_bytes(machine.symbols["program"], program.encoded())
+            poke_words(machine, "wanted_records", (most,))
+            try:
+                machine.run_to("machine_done", "hal_stop")
+            except Stopped as stopped:
+                raise AssertionError(f"{program}\n{stopped}") from None
+            at, count = machine.symbols["records"], peek(machine, "recorded")
+            return list(RECORD.iter_unpack(machine.peek_bytes(at, count * RECORD.size)))
 
 
 def out_of_memory(records: list[Record]) -> int:

@@ -1,0 +1,54 @@
+/* CPUs in QEMU: records are kept in RAM until the test reads them in machine_done(). Linked with --wrap=hal_idle. */
+#include "../../model/interpreter.h"
+
+#include "hal_board.h"
+#include "kernel.h"
+
+volatile uint16 wanted_records, recorded; /* the test writes the first */
+record records[MOST_RECORDS];
+static uint16 idles;
+static void (*isr)(void);
+
+void machine_init(void);
+void machine_done(void);
+void __real_hal_idle(const volatile uint16_t *pending);
+void __wrap_hal_idle(const volatile uint16_t *pending);
+
+static void mask_interrupts(void); /* until hal_idle() ends; a masked interrupt still ends the sleep */
+
+HAL_OUTLINE void machine_done(void)
+{
+    (void)hal_lock_devices();
+    for (;;) {
+        __asm__ volatile("" ::: "memory");
+    }
+}
+
+void machine_record(const record *r)
+{
+    records[recorded] = *r;
+    if (++recorded == wanted_records) {
+        machine_done();
+    }
+}
+
+/* The clock stands still: a tick that came before the CPU sleeps, and gives the kernel no work, would be its last. */
+void __wrap_hal_idle(const volatile uint16_t *pending)
+{
+    if (++idles == MOST_IDLES) {
+        machine_done();
+    }
+    if ((*pending & OS_WORK) == 0) {
+        mask_interrupts();
+        machine_tick();
+    }
+    __real_hal_idle(pending);
+}
+
+/* A tick counts 1 ms of the slice, which shall not end before machine_slice(). */
+static void restore_slice(void)
+{
+    if (!hal_slice_is_over()) {
+        cpu_slice_ms = CPU_SLICE_MS;
+    }
+}
