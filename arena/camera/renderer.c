@@ -57,7 +57,7 @@ struct view {
     const struct led *led_positions;
     i64 led_count, led_class, body_class;
     f64 led_cos; // cosine of half the angle of the edge that a LED lights
-    struct disc robot;
+    struct disc *robot_discs;
     const struct disc *object_discs;
     const struct disc *fixed;
     i64 fixed_count;
@@ -165,12 +165,13 @@ void set_viewpoint(struct view *v, const f64 *poses, const f64 *before, f64 quan
     for (i64 i = 0; i < v->robots; i++) {
         if (i == v->own)
             continue;
+        struct disc *robot = &v->robot_discs[i];
         if (v->lit) {
             f64 c = cos(poses[3 * i + 2]), s = sin(poses[3 * i + 2]);
-            v->robot.leds = v->lit[i];
-            v->robot.cos = c * v->cos + s * v->sin, v->robot.sin = s * v->cos - c * v->sin;
+            robot->leds = v->lit[i];
+            robot->cos = c * v->cos + s * v->sin, robot->sin = s * v->cos - c * v->sin;
         }
-        add_disc(v, poses[3 * i], poses[3 * i + 1], &v->robot);
+        add_disc(v, poses[3 * i], poses[3 * i + 1], robot);
     }
     sort(v->discs, v->disc_count);
     for (i64 i = 0; i < v->outline_count; i++)

@@ -20,7 +20,7 @@ from arena.camera.appearance import COLOURS, LED_POSITIONS, NOTHING, OBJECT, ROB
 from arena.camera.lens import Floats, lens_of
 from arena.scene import dimensions
 from arena.scene.loader import Scene
-from arena.world.physics import Traits
+from arena.scene.robot_kind import Traits
 from arena.world.poses import Poses
 from emu.native_library import ADDRESS, DOUBLE, INT, address_of, functions
 
@@ -79,7 +79,7 @@ class _View(Structure):
         *((name, c_int64) for name in ("own", "robots", "objects", "is_furnished")),
         ("lit", c_void_p), ("led_positions", POINTER(_Led)),
         *((name, c_int64) for name in ("led_count", "led_class", "body_class")), ("led_cos", c_double),
-        ("robot", _Disc), ("object_discs", POINTER(_Disc)),
+        ("robot_discs", POINTER(_Disc)), ("object_discs", POINTER(_Disc)),
         ("fixed", POINTER(_Disc)), ("fixed_count", c_int64), ("outlines", POINTER(_Side)), ("outline_count", c_int64),
         ("patches", POINTER(_Patch)), ("patch_count", c_int64),
         ("discs", POINTER(_Disc)), ("disc_count", c_int64), ("sides", POINTER(_Side)), ("side_count", c_int64),
@@ -185,6 +185,10 @@ class Renderer:
         self._bodies: Final = bodies
         self.leds: Final = np.zeros(scene.robots.count, dtype=np.int64)
         """Lit LEDs of each robot, bit n: ring LED n, 8 front, 9 body; used in scenes with `camera.sees_leds`."""
+        kinds = map(scene.robot_kind, range(scene.robots.count))
+        self._robot_discs: Final = (_Disc * scene.robots.count)(*(
+            _Disc(0.0, 0.0, kind.radius_cm, kind.height_cm, bodies.robot) for kind in kinds
+        ))  # fmt: skip
         self._discs: Final = (_Disc * (len(bodies.objects) + scene.robots.count))()
         self._sides: Final = (_Side * (len(bodies.outlines) + sum(map(len, bodies.polygon_corners))))()
         self._view: Final = _View(
@@ -193,8 +197,7 @@ class Renderer:
             own, scene.robots.count, len(bodies.objects), scene.is_furnished,
             self.leds.ctypes.data if scene.camera.sees_leds else None, bodies.led_positions,
             len(bodies.led_positions), *bodies.led_classes, dimensions.LED_COS,
-            _Disc(0.0, 0.0, dimensions.ROBOT_RADIUS, dimensions.ROBOT_HEIGHT, bodies.robot), bodies.objects,
-            bodies.fixed, len(bodies.fixed), bodies.outlines, len(bodies.outlines),
+            self._robot_discs, bodies.objects, bodies.fixed, len(bodies.fixed), bodies.outlines, len(bodies.outlines),
             bodies.patches, len(bodies.patches), self._discs, 0, self._sides, 0,
             bodies.polygons, len(bodies.polygons),
         )  # fmt: skip

@@ -25,7 +25,7 @@ from arena.experiments import Experiment, experiment_of
 from arena.experiments.declaration import CURVE_COLUMN, declaration_of
 from arena.infrared.channel import OpticalChannel
 from arena.replay.live_feed import LiveFile, live_path
-from arena.robots.controller import Controller, ScriptedController
+from arena.robots.controller import Controller, Program
 from arena.scene.loader import Scene, SceneError
 from arena.scene.schema import RobotGroup
 from arena.trial.manifest import MANIFEST, read_manifest, write_manifest
@@ -37,10 +37,6 @@ from arena.world.physics import World
 Report = Callable[[int, float], None]
 """Progress callback: number of a trial, and its simulated seconds so far."""
 _queue: Any = None
-
-SELECTOR = {"A": 0, "B": 1}
-"""Position of the robots' rotary switch for each controller that firmware has. In firmware/apps/clustering bit 0
-selects controller B, and bit 3 starts the robot without the remote control."""
 
 
 @dataclass(frozen=True)
@@ -126,25 +122,20 @@ def trial_path(folder: Path, number: int) -> Path:
 
 
 def make_controllers(plan: Plan, seed: int, robots: Sequence[int], channel: OpticalChannel | None) -> list[Controller]:
-    """Return the controllers of some robots. Raises emu.LoadError for an unusable image."""
-    return [_controller(plan, seed, robot, channel) for robot in robots]
+    """Return the controllers of some robots, made by the engine of each kind. Raises emu.LoadError for an unusable
+    image."""
+    made: dict[int, Controller] = {}
+    for kind in dict.fromkeys(map(plan.scene.robot_kind, robots)):
+        mine = [robot for robot in robots if plan.scene.robot_kind(robot) is kind]
+        programs = [_program(plan, robot) for robot in mine]
+        made |= zip(mine, kind.controllers(plan.scene, seed, mine, programs, channel), strict=True)
+    return [made[robot] for robot in robots]
 
 
-def _controller(plan: Plan, seed: int, robot: int, channel: OpticalChannel | None) -> Controller:
-    """Return the controller of one robot, by the firmware and controller of its group."""
+def _program(plan: Plan, robot: int) -> Program:
+    """Return what a robot runs, by the firmware and controller of its group."""
     group = plan.scene.group_of(robot)
-    own, image, controller = plan.own_controller_of(group), plan.image_of(group), group.controller or plan.controller
-    if own is not None:
-        from arena.robots.own_controller import OwnController, load_controller
-
-        return OwnController(plan.scene, seed, robot, load_controller(own))
-    if image is None:
-        return ScriptedController(plan.scene, seed, robot, controller)
-    from arena.robots.firmware_controller import FirmwareController  # scripted trials do not load the emulator
-
-    chosen = plan.scene.start_of(robot).selector
-    selector = SELECTOR.get(controller, 0) if chosen < 0 else chosen
-    return FirmwareController(plan.scene, seed, robot, image, selector, channel)
+    return Program(group.controller or plan.controller, plan.image_of(group), plan.own_controller_of(group))
 
 
 @contextmanager

@@ -8,11 +8,12 @@ from pathlib import Path
 
 from arena.analysis.comparison import NEAR_S
 from arena.analysis.report import with_results
-from arena.campaign.campaign import SELECTOR, check_folder
+from arena.campaign.campaign import check_folder
 from arena.commands import report
 from arena.commands import run as single
 from arena.commands.arguments import count, count_or_none, duration
 from arena.commands.run import DEFAULT_CONTROLLER
+from arena.robots.epuck import SELECTOR
 
 EXAMPLE = "example: arena experiment clustering --document docs/experiment-appendix.md --figures docs/figures"
 

@@ -12,10 +12,11 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from arena.campaign.campaign import SELECTOR, FinishedTrial, Plan, locked_folder, open_folder, run_all
+from arena.campaign.campaign import FinishedTrial, Plan, locked_folder, open_folder, run_all
 from arena.commands.arguments import count, count_or_none, duration, removed_processes
 from arena.commands.progress import ProgressDisplay
 from arena.experiments import experiment_file
+from arena.robots.epuck import SELECTOR
 from arena.robots.images import image_for
 from arena.robots.reactive import SPEED_TABLES
 from arena.scene.loader import Scene, load_scene, scripted

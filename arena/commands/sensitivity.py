@@ -12,10 +12,11 @@ from typing import Any, Final
 import numpy as np
 
 from arena.analysis.comparison import series_by_seed
-from arena.campaign.campaign import SELECTOR, Plan, locked_folder, open_folder
+from arena.campaign.campaign import Plan, locked_folder, open_folder
 from arena.commands.arguments import count, count_or_none, duration
 from arena.commands.run import folder_name, run_with_progress, with_overrides
 from arena.experiments import experiment_file, experiment_of
+from arena.robots.epuck import SELECTOR
 from arena.scene.loader import load_scene, scripted
 from arena.trial.record import EXPERIMENT, trials_in, write_bytes, write_text
 from arena.trial.strict_json import json_text

@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 
 from arena.experiments import Experiment
 from arena.robots.controller import Controller
-from arena.scene import dimensions
 from arena.scene.loader import Scene, SceneError
 from arena.scene.placement import obstruction, outlines_of
 from arena.world.physics import COLLISION_SLOP, STREAM_EXPERIMENT, World, generator
@@ -98,7 +97,7 @@ class Supervisor:
     def _check_free(self, disc: int, name: str, x: float, y: float) -> None:
         """Raise SceneError if a body cannot be at a position. `disc` is its index, robots first."""
         poses = self._world.poses
-        discs = [(robot[0], robot[1], dimensions.ROBOT_RADIUS) for robot in poses.robots]
+        discs = [(robot[0], robot[1], self.scene.robot_kind(n).radius_cm) for n, robot in enumerate(poses.robots)]
         discs += [(place[0], place[1], self.scene.kind_of(n).radius_cm) for n, place in enumerate(poses.objects)]
         radius = discs.pop(disc)[2] - COLLISION_SLOP
         why = obstruction(self.scene, outlines_of(self.scene), discs, x, y, radius)

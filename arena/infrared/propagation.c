@@ -17,7 +17,7 @@ enum { SENSORS = 8, LINES = 4 };
 static const f64 PI = 3.14159265358979323846;
 
 struct disc {
-    f64 x, y, radius, share; // x and y are not set in `robot` and `objects`
+    f64 x, y, radius, share; // x and y are not set in `robots` and `objects`
 };
 
 struct side {
@@ -36,7 +36,7 @@ struct optics {
     f64 gain, per_emitter, emitter_power, receiver_power;
     f64 width, height, wall_share, range;
     f64 bearings[SENSORS];
-    struct disc robot;
+    const struct disc *robots;
     const struct disc *objects;
     const struct disc *fixed;
     i64 fixed_count;
@@ -56,7 +56,7 @@ struct poses {
 static struct disc disc_of(const struct optics *o, const struct poses *p, i64 number)
 {
     if (number < p->robots) {
-        struct disc robot = o->robot;
+        struct disc robot = o->robots[number];
         robot.x = p->values[3 * number], robot.y = p->values[3 * number + 1];
         return robot;
     }
@@ -188,7 +188,7 @@ static void surface(const struct optics *o, const struct poses *p, i64 own, i64 
             share = one.share * sqrt(root) / one.radius;
         }
     }
-    f64 gap = distance - o->robot.radius > 0 ? distance - o->robot.radius : 0;
+    f64 radius = o->robots[own].radius, gap = distance - radius > 0 ? distance - radius : 0;
     found[0] = gap <= o->range ? gap : __builtin_inf();
     found[1] = gap <= o->range ? share : 0;
 }

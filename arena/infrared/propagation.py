@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable
-from ctypes import POINTER, Structure, addressof, c_double, c_int64, c_void_p
+from ctypes import POINTER, Array, Structure, addressof, c_double, c_int64, c_void_p
 from functools import cache
 from pathlib import Path
 from typing import Any, Final, NamedTuple
@@ -19,6 +19,7 @@ import numpy as np
 
 from arena.scene import dimensions, geometry
 from arena.scene.loader import Scene
+from arena.scene.robot_kind import EPUCK
 from arena.world.poses import Poses
 from emu.boards.epuck.analog import PULSE_PINS, SENSORS
 from emu.native_library import ADDRESS, INT, functions
@@ -113,7 +114,7 @@ class _Optics(Structure):
         *((name, c_double) for name in ("law_counts", "law_from", "law_power", "max_counts", "min_counts", "gain",
                                         "per_emitter", "emitter_power", "receiver_power", "width", "height",
                                         "wall_share", "range")),
-        ("bearings", c_double * SENSORS), ("robot", _Disc), ("objects", POINTER(_Disc)),
+        ("bearings", c_double * SENSORS), ("robots", POINTER(_Disc)), ("objects", POINTER(_Disc)),
         ("fixed", POINTER(_Disc)), ("fixed_count", c_int64), ("sides", POINTER(_Side)), ("side_count", c_int64),
         ("polygons", POINTER(_Polygon)), ("polygon_count", c_int64),
     ]  # fmt: skip
@@ -140,6 +141,8 @@ class Optics:
     def __init__(self, scene: Scene) -> None:
         code, setting = _code(), scene.infrared
         self._signal, self._surfaces = code["signal"], code["surfaces"]
+        self._scene = scene
+        self._robots = self._robot_discs(scene.robots.count)
         kinds = list(map(scene.kind_of, range(scene.objects.count)))
         self._objects = (_Disc * scene.objects.count)(*(
             _Disc(0, 0, kind.radius_cm if is_in_reach(kind.height_cm) and not kind.polygon else 0, kind.share)
@@ -162,7 +165,7 @@ class Optics:
             LAW_COUNTS, LAW_FROM_CM, LAW_POWER, MAX_COUNTS, MIN_COUNTS,
             setting.signal_gain, 1 / brightest(setting.emitter_power), setting.emitter_power, setting.receiver_power,
             scene.arena.width_cm, scene.arena.height_cm, setting.wall_share, dimensions.IR_RANGE,
-            (c_double * SENSORS)(*_BEARINGS), _Disc(0, 0, dimensions.ROBOT_RADIUS, setting.robot_share), self._objects,
+            (c_double * SENSORS)(*_BEARINGS), self._robots, self._objects,
             self._fixed, len(fixed), self._sides, len(sides), self._polygons, len(shaped),
         )  # fmt: skip
         self._at = addressof(self._optics)
@@ -171,9 +174,21 @@ class Optics:
         self._found = (c_double * (2 * SENSORS))()
         self._found_at = addressof(self._found)
 
+    def _robot_discs(self, count: int) -> Array[_Disc]:
+        """Return the bodies of `count` robots as far as they reflect; those beyond the scene's are e-pucks."""
+        of_scene = min(count, self._scene.robots.count)
+        kinds = [*map(self._scene.robot_kind, range(of_scene)), *[EPUCK] * (count - of_scene)]
+        return (_Disc * count)(*(
+            _Disc(0, 0, kind.radius_cm if is_in_reach(kind.height_cm) else 0, self._scene.infrared.robot_share)
+            for kind in kinds
+        ))  # fmt: skip
+
     def _set_poses(self, poses: Poses) -> None:
         """Pass the poses to native code. Raises ValueError if their objects are not the first ones of the scene."""
         robots, objects, polygons = poses.counts
+        if robots > len(self._robots):
+            self._robots = self._robot_discs(robots)
+            self._optics.robots = self._robots
         if objects > len(self._objects):
             raise ValueError(f"{objects} objects are more than the scene has")
         if polygons != sum(one.object < objects for one in self._polygons):

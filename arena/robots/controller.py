@@ -6,6 +6,7 @@ Once per quantum a controller takes the poses at the start of the quantum and re
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Final, NamedTuple, Protocol
 
 from arena.camera.appearance import NOTHING, OBJECT
@@ -71,11 +72,21 @@ class Reading:
     """Why the robot's firmware stopped; empty while it runs."""
 
 
+@dataclass(frozen=True, slots=True)
+class Program:
+    """What a robot runs: an image, else the Python file of a controller, else the table of speeds `controller`."""
+
+    controller: str
+    image: Path | None = None
+    file: Path | None = None
+
+
 class Controller(Protocol):
     """The controller of one robot."""
 
     def control_step(self, tick: int, poses: Poses) -> tuple[float, float]:
-        """Run quantum `tick`, which begins with `poses`; return the wheel speeds (left, right) in cm/s during it."""
+        """Run quantum `tick`, which begins with `poses`; return the values of the drive (left, right) during it: wheel
+        speeds of an e-puck in cm/s, duties of a Kilobot's motors."""
 
     def reading(self) -> Reading:
         """Return the values to record, and begin the next period of `load`."""
@@ -91,6 +102,12 @@ class Controller(Protocol):
 
     def take_uart(self) -> bytes:
         """Return the bytes sent on UART1 since the last call; they are kept from the first call on."""
+
+    def state(self) -> bytes:
+        """Return the whole state of the robot's machine; empty without one."""
+
+    def place(self) -> str:
+        """Return what the robot executes at present, as text for the debugger."""
 
     def close(self) -> None:
         """Release processes and memory."""
@@ -123,6 +140,14 @@ class ControllerWithoutUart:
     def take_uart(self) -> bytes:
         """Return no bytes: this controller has no UART."""
         return b""
+
+    def state(self) -> bytes:
+        """Return no bytes: this controller has no machine."""
+        return b""
+
+    def place(self) -> str:
+        """As `Controller.place`."""
+        return "a script"
 
     def close(self) -> None:
         """Do nothing: there is nothing to release."""

@@ -44,6 +44,7 @@ from emu.boards.epuck.remote import REPEAT_SECONDS
 from emu.boards.epuck.simple import LED_PINS, Battery
 from emu.boards.epuck.stimulus import parse
 from emu.debug.fault_report import VECNUM
+from emu.machine.machine import Machine
 from emu.system.native_handle import Call
 
 PROBE_TCY: Final = 147_456
@@ -431,8 +432,23 @@ class FirmwareController:
         self._uart_output = bytearray()
         return output
 
+    def state(self) -> bytes:
+        """As `Controller.state`."""
+        return self.machine.snapshot()
+
+    def place(self) -> str:
+        """As `Controller.place`: function and offset, cycle, and whether the CPU sleeps."""
+        machine = self.machine
+        sleeps = ", asleep" if machine.is_asleep else ""
+        return f"{function_at(machine) or f'{machine.pc:#08x}'}, cycle {machine.cycle:,}{sleeps}"
+
     def close(self) -> None:
         """Do nothing: the machine is freed with the object."""
+
+
+def function_at(machine: Machine) -> str:
+    """Return the name of the function that the machine executes, and the offset in it."""
+    return machine.image.symbols.text(machine.pc) if machine.image else ""
 
 
 def _pixel_noise(rng: np.random.Generator, sd: float) -> NDArray[np.int16]:

@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping
 from typing import Any, Final
 
 from arena.scene import geometry
+from arena.scene.robot_kind import KINDS
 from arena.scene.schema import INHERIT, LIMITS, NAMED, PLACES, ObjectKind, Points, RobotGroup
 from emu.boards.epuck.remote import KEYS
 
@@ -114,6 +115,8 @@ def check_placed(errors: TableErrors, table: str, one: Any, number: int) -> None
 def check_group(errors: TableErrors, table: str, one: RobotGroup, number: int) -> None:
     """Check a table [[robots]]. Raises SceneError."""
     check_placed(errors, table, one, number)
+    if one.kind not in KINDS:
+        raise errors.at(table, "kind", f"{table}.kind is {one.kind!r}; expected {', '.join(KINDS)}", number)
     check_key(errors, table, one.remote, number)
     if abs(one.heading_deg) > 1e6:
         words = f"{table}.heading_deg is {one.heading_deg}; expected -1e6 to 1e6, or nan for any"

@@ -26,6 +26,7 @@ from arena.scene.checks import (
     check_shape,
     wrong_points,
 )
+from arena.scene.robot_kind import KINDS, RobotKind
 from arena.scene.schema import (
     FCY,
     INHERIT,
@@ -92,6 +93,10 @@ class Scene:
     def group_of(self, robot: int) -> RobotGroup:
         """Return the group of a robot."""
         return _nth(self.groups, robot) if self.groups else RobotGroup()
+
+    def robot_kind(self, robot: int) -> RobotKind:
+        """Return the kind of a robot: its body, its drive and its engine."""
+        return KINDS[self.group_of(robot).kind]
 
     def id_of(self, robot: int) -> int:
         """Return the number that replaces `{id}` in a robot's stimulus: its index in its group plus `id_first`."""

@@ -9,8 +9,9 @@ from typing import Final
 
 import numpy as np
 
-from arena.scene import dimensions, geometry
+from arena.scene import geometry
 from arena.scene.loader import Scene, SceneError
+from arena.scene.robot_kind import EPUCK, KINDS
 from arena.scene.schema import ObjectKind, Placed, RobotGroup
 
 Place = tuple[float, ...]
@@ -36,7 +37,7 @@ def place_all(scene: Scene, rng: np.random.Generator) -> tuple[list[tuple[float,
     """
     if scene.groups or scene.kinds or scene.is_furnished:
         return _Placer(scene, rng).place()
-    radii = [dimensions.ROBOT_RADIUS] * scene.robots.count + [scene.objects.radius_cm] * scene.objects.count
+    radii = [EPUCK.radius_cm] * scene.robots.count + [scene.objects.radius_cm] * scene.objects.count
     marks = marks_of(scene)
     if len(radii) > len(marks):
         raise SceneError(f"{scene.name}: no room: {len(radii)} robots and objects on {len(marks)} marks")
@@ -105,7 +106,7 @@ class _Placer:
         kinds = scene.kinds or (replace(scene.kind_of(0), count=scene.objects.count),)
         marks = marks_of(scene)
         self._marks = iter([marks[index] for index in self._rng.permutation(len(marks))])
-        wanted: list[tuple[Placed, str, float]] = [(one, "robot", dimensions.ROBOT_RADIUS) for one in groups]
+        wanted: list[tuple[Placed, str, float]] = [(one, "robot", KINDS[one.kind].radius_cm) for one in groups]
         wanted += [(one, "object", one.radius_cm) for one in kinds]
         found: dict[int, list[tuple[float, ...]]] = {}
         for number in sorted(range(len(wanted)), key=lambda number: wanted[number][0].place != "poses"):

@@ -223,6 +223,7 @@ class Placed:
 class RobotGroup(Placed):
     """Robots of one kind.
 
+    - `kind`: epuck
     - `image`: their controller, as `--brain`; a path is relative to the scene file; empty: that of the run. `--brain`
       replaces the images of a scene in which every group has one.
     - `controller`: table A, B or aggregate, the controller transport, or a Python file or entry point
@@ -232,6 +233,7 @@ class RobotGroup(Placed):
     - `selector`, `remote`, `stimulus`: as in [start]
     """
 
+    kind: str = "epuck"
     image: str = ""
     controller: str = ""
     id_first: int = 0

@@ -20,11 +20,11 @@ from typing import Any, Final, NamedTuple
 from arena.campaign.campaign import Plan, controllers_of
 from arena.debug.attach import AttachedRobot
 from arena.replay.page import sample_data
-from arena.robots.firmware_controller import FirmwareController
+from arena.robots.firmware_controller import FirmwareController, function_at
 from arena.scene.loader import SceneError
 from arena.trial.checkpoints import CAN_FORK, PipeClosedError, PipeEnd, ProcessForker
 from arena.trial.record import Trial
-from arena.trial.snapshot import function_at, state_digest
+from arena.trial.snapshot import state_digest
 from arena.trial.trial import RunningTrial
 
 POLL_S: Final = 0.05

@@ -9,9 +9,7 @@ import hashlib
 from collections.abc import Sequence
 
 from arena.robots.controller import Controller
-from arena.robots.firmware_controller import FirmwareController
 from arena.world.physics import World
-from emu.machine.machine import Machine
 
 
 def state_digest(world: World, controllers: Sequence[Controller]) -> str:
@@ -21,14 +19,8 @@ def state_digest(world: World, controllers: Sequence[Controller]) -> str:
         moves = tuple(body.position), body.angle, tuple(body.velocity), body.angular_velocity
         found.update(repr(moves).encode())
     for controller in controllers:
-        if isinstance(controller, FirmwareController):
-            found.update(controller.machine.snapshot())
+        found.update(controller.state())
     return found.hexdigest()
-
-
-def function_at(machine: Machine) -> str:
-    """Return the name of the function that the machine executes, and the offset in it."""
-    return machine.image.symbols.text(machine.pc) if machine.image else ""
 
 
 def state_view(world: World, controllers: Sequence[Controller], robot: int) -> list[tuple[str, str]]:
@@ -39,12 +31,7 @@ def state_view(world: World, controllers: Sequence[Controller], robot: int) -> l
     poses = world.poses
     rows = [("world", f"t = {world.seconds:.4f} s, {world.ticks} quanta are over")]
     for number, ((x, y, heading), controller) in enumerate(zip(poses.robots, controllers, strict=True)):
-        at = "a script"
-        if isinstance(controller, FirmwareController):
-            machine = controller.machine
-            sleeps = ", asleep" if machine.is_asleep else ""
-            at = f"{function_at(machine) or f'{machine.pc:#08x}'}, cycle {machine.cycle:,}{sleeps}"
         mine = " (this one)" if number == robot else ""
-        rows.append((f"robot {number}", f"x {x:.2f}, y {y:.2f}, heading {heading:.3f}; {at}{mine}"))
+        rows.append((f"robot {number}", f"x {x:.2f}, y {y:.2f}, heading {heading:.3f}; {controller.place()}{mine}"))
     rows += [(f"object {number}", f"x {x:.2f}, y {y:.2f}") for number, (x, y) in enumerate(poses.objects)]
     return [*rows, ("state", state_digest(world, controllers))]

@@ -39,8 +39,16 @@ struct disc {
     i64 is_checked, is_resting, can_rest;
 };
 
+// How the commanded values (left, right) move a robot: `Drive` of robot_kind.py.
+struct drive {
+    f64 axle; // of wheels; 0: vibration motors
+    f64 ahead, turn, leg_back, leg_aside;
+    f64 thrust, thrust_torque, brake, brake_torque;
+};
+
 struct robot {
     void *body, *driven_body, *push_joint, *turn_joint; // pushed body, body the wheels move; no joints: no slip
+    const struct drive *drive;
     f64 bias[2], noise[2];
     i64 is_braked;
 };
@@ -48,7 +56,7 @@ struct robot {
 struct world {
     struct chipmunk c;
     void *space;
-    f64 dt, axle, thrust, thrust_torque, brake, brake_torque;
+    f64 dt;
     i64 robot_count, object_count;
     struct robot *robots;
     struct disc *discs; // the robots', then the objects; of a polygon the circumscribed circle
@@ -79,13 +87,14 @@ void read_poses(const struct world *w, f64 *out)
         *out++ = w->c.angle(w->polygons[i]);
 }
 
-// Limit the joints of a robot to the force of its turning wheels or of its brakes.
+// Limit the joints of a robot to the force of its drive or of its brakes.
 static void set_grip(const struct world *w, const struct robot *r)
 {
     if (!r->push_joint)
         return;
-    w->c.set_max_force(r->push_joint, r->is_braked ? w->brake : w->thrust);
-    w->c.set_max_force(r->turn_joint, r->is_braked ? w->brake_torque : w->thrust_torque);
+    const struct drive *d = r->drive;
+    w->c.set_max_force(r->push_joint, r->is_braked ? d->brake : d->thrust);
+    w->c.set_max_force(r->turn_joint, r->is_braked ? d->brake_torque : d->thrust_torque);
 }
 
 static f64 square(f64 x)
@@ -185,7 +194,21 @@ static void put_to_rest(struct world *w)
         }
 }
 
-// Run one quantum with the commanded speeds (left, right) of each robot.
+// Velocity of a body in its own frame, cm/s and rad/s.
+struct twist {
+    f64 ahead, aside, turn;
+};
+
+// Twist of a robot for its commanded values. A single vibration motor turns the robot about the leg on the other side.
+static struct twist twist_of(const struct drive *d, f64 left, f64 right)
+{
+    if (d->axle > 0)
+        return (struct twist){(left + right) / 2, 0, (right - left) / d->axle};
+    f64 turn = d->turn * (left - right), leg = turn < 0 ? -d->leg_aside : d->leg_aside;
+    return (struct twist){d->ahead * (left < right ? left : right) + turn * leg, turn * d->leg_back, turn};
+}
+
+// Run one quantum with the commanded values (left, right) of each robot.
 void run_quantum(struct world *w, const f64 *wheels)
 {
     for (i64 i = 0; i < w->robot_count; i++) {
@@ -197,10 +220,13 @@ void run_quantum(struct world *w, const f64 *wheels)
             set_grip(w, r);
         }
         left = left * r->noise[0] * r->bias[0], right = right * r->noise[1] * r->bias[1];
-        f64 turn = (right - left) / w->axle, ahead = (left + right) / 2;
-        f64 heading = w->c.angle(r->body) + turn * w->dt / 2;
-        w->c.set_velocity(r->driven_body, (struct vect){ahead * cos(heading), ahead * sin(heading)});
-        w->c.set_turning(r->driven_body, turn);
+        struct twist by = twist_of(r->drive, left, right);
+        f64 heading = w->c.angle(r->body) + by.turn * w->dt / 2, east = cos(heading), north = sin(heading);
+        struct vect velocity = {by.ahead * east, by.ahead * north};
+        if (by.aside != 0)
+            velocity.x -= by.aside * north, velocity.y += by.aside * east;
+        w->c.set_velocity(r->driven_body, velocity);
+        w->c.set_turning(r->driven_body, by.turn);
     }
     wake_neighbours(w);
     if (++w->steps % REST_PERIOD == 0)

@@ -1,4 +1,4 @@
-"""The world in two dimensions: walls, objects with floor friction, e-pucks with force-limited wheels (epuck.md §4).
+"""The world in two dimensions: walls, objects with floor friction, robots with force-limited drives (epuck.md §4).
 
 Lengths cm, masses kg, time s. One `step` is one quantum, always of the same length. Only the wheel speeds act on the
 bodies between two steps. The same calls give the same numbers, to the bit.
@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from ctypes import POINTER, Structure, addressof, c_double, c_int64, c_void_p
+from ctypes import POINTER, Structure, addressof, c_double, c_int64, c_void_p, pointer
 from functools import cache
 from pathlib import Path
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
 import numpy as np
 import pymunk
@@ -21,6 +21,7 @@ from pymunk._chipmunk_cffi import ffi, lib
 from arena.scene import dimensions, geometry
 from arena.scene.loader import Scene
 from arena.scene.placement import Place, place_all
+from arena.scene.robot_kind import Drive, RobotKind, Traits
 from arena.scene.schema import ObjectKind
 from arena.world.poses import PoseBlock, Poses
 from emu.native_library import ADDRESS, INT, address_of, functions
@@ -45,24 +46,10 @@ def generator(seed: int, stream: int, robot: int = 0) -> np.random.Generator:
     return np.random.default_rng([seed, stream, robot])
 
 
-class Traits(NamedTuple):
-    """Deviations of one robot from the nominal one.
-
-    `yaw` and `pitch_deg` turn its camera to the left and up. `bias` are factors on the commanded speed of its left and
-    right wheel.
-    """
-
-    yaw: float = 0.0
-    pitch_deg: float = 0.0
-    bias: tuple[float, float] = (1.0, 1.0)
-
-
 def traits_of(scene: Scene, seed: int, robot: int) -> Traits:
     """Draw the deviations of a robot in a trial. With zero spread they are exactly those of the nominal robot."""
-    spread = scene.robots
-    yaw, pitch, left, right = generator(seed, STREAM_TRAITS, robot).normal(0.0, 1.0, 4).tolist()
-    bias = (1.0 + spread.wheel_bias_sd * left, 1.0 + spread.wheel_bias_sd * right)
-    return Traits(math.radians(spread.camera_yaw_sd_deg * yaw), spread.camera_pitch_sd_deg * pitch, bias)
+    kind = scene.robot_kind(robot)
+    return kind.traits(getattr(scene, kind.table), generator(seed, STREAM_TRAITS, robot).normal(0.0, 1.0, 4).tolist())
 
 
 class _Chipmunk(Structure):
@@ -75,11 +62,29 @@ class _Chipmunk(Structure):
     _fields_ = [(name, c_void_p) for name in NAMES]
 
 
+class _Drive(Structure):
+    """`struct drive` of physics.c."""
+
+    _fields_ = [(name, c_double) for name in ("axle", "ahead", "turn", "leg_back", "leg_aside", "thrust",
+                                              "thrust_torque", "brake", "brake_torque")]  # fmt: skip
+
+    @classmethod
+    def of(cls, drive: Drive) -> _Drive:
+        """Return the struct of a drive."""
+        forces = [force for newtons in (drive.thrust_n, drive.brake_n) for force in _grip(drive, newtons)]
+        return cls(drive.axle_cm, drive.ahead, drive.turn, drive.leg_back_cm, drive.leg_aside_cm, *forces)
+
+
+def _grip(drive: Drive, force_n: float) -> tuple[float, float]:
+    """Return the greatest force and torque with which a drive pulls or holds a robot."""
+    return dimensions.newton(force_n), dimensions.newton(force_n) * drive.lever_cm
+
+
 class _Robot(Structure):
     """`struct robot` of physics.c."""
 
     _fields_ = [
-        *((name, c_void_p) for name in ("body", "driven_body", "push_joint", "turn_joint")),
+        *((name, c_void_p) for name in ("body", "driven_body", "push_joint", "turn_joint")), ("drive", POINTER(_Drive)),
         ("bias", c_double * 2), ("noise", c_double * 2), ("is_braked", c_int64),
     ]  # fmt: skip
 
@@ -98,8 +103,7 @@ class _World(Structure):
 
     _fields_ = [
         ("chipmunk", _Chipmunk), ("space", c_void_p),
-        *((name, c_double) for name in ("dt", "axle", "thrust", "thrust_torque", "brake", "brake_torque")),
-        ("robot_count", c_int64), ("object_count", c_int64),
+        ("dt", c_double), ("robot_count", c_int64), ("object_count", c_int64),
         ("robots", POINTER(_Robot)), ("discs", POINTER(_Disc)), ("steps", c_int64),
         ("polygons", POINTER(c_void_p)), ("polygon_count", c_int64),
     ]  # fmt: skip
@@ -166,14 +170,18 @@ class World:
         self.space.collision_slop = COLLISION_SLOP
         self._add_walls()
         self._add_obstacles()
-        self.robots = [self._add_robot(*pose) for pose in robots]
+        self._kinds: list[RobotKind] = [scene.robot_kind(robot) for robot in range(len(robots))]
+        self._drives: dict[str, Drive] = {kind.name: kind.drive(getattr(scene, kind.table)) for kind in self._kinds}
+        self.robots = [self._add_robot(kind, *pose) for kind, pose in zip(self._kinds, robots, strict=True)]
         self._joints: list[tuple[pymunk.PivotJoint, pymunk.GearJoint] | None] = []
-        drives = [self._add_drive(body) for body in self.robots]
+        drives = [self._add_drive(kind, body) for kind, body in zip(self._kinds, self.robots, strict=True)]
         self._floor: list[tuple[pymunk.PivotJoint, pymunk.GearJoint]] = []
         kinds = list(map(scene.kind_of, range(len(objects))))
         self.objects = [self._add_object(kind, *place) for kind, place in zip(kinds, objects, strict=True)]
         self._polygons = [body for kind, body in zip(kinds, self.objects, strict=True) if kind.polygon]
         self._wheel_rng = [generator(seed, STREAM_WHEELS, robot) for robot in range(len(robots))]
+        self._noises = [self._drives[kind.name].noise for kind in self._kinds]
+        """Noise of each robot's drive."""
         self._noise_ticks = max(round(scene.robots.noise_period_s / self.dt), 1)
         self._fill_structs(seed, drives)
         self.poses = self._read()
@@ -185,16 +193,17 @@ class World:
             code[name] for name in ("run_quantum", "run_quanta", "read_poses")
         )
         self._robots = (_Robot * len(self.robots))()
-        parts = zip(self._robots, self.robots, drives, self._joints, strict=True)
-        for number, (robot, body, drive, joints) in enumerate(parts):
+        self._drive_structs = {name: _Drive.of(drive) for name, drive in self._drives.items()}
+        parts = zip(self._robots, self.robots, drives, self._joints, self._kinds, strict=True)
+        for number, (robot, body, drive, joints, kind) in enumerate(parts):
+            robot.drive = pointer(self._drive_structs[kind.name])
             robot.body, robot.driven_body = _address(body._body), _address((drive or body)._body)
             if joints is not None:
                 robot.push_joint, robot.turn_joint = (_address(joint._constraint) for joint in joints)
             robot.bias[:] = traits_of(self.scene, seed, number).bias
             robot.noise[:] = 1.0, 1.0
-        setting = self.scene.robots
-        forces = [force for newtons in (setting.thrust_n, setting.brake_n) for force in self._grip(newtons)]
-        discs = [_Disc(robot.body, None, None, dimensions.ROBOT_RADIUS) for robot in self._robots]
+        discs = [_Disc(robot.body, None, None, kind.radius_cm)
+                 for robot, kind in zip(self._robots, self._kinds, strict=True)]  # fmt: skip
         for number, (body, joints) in enumerate(zip(self.objects, self._floor, strict=True)):
             addresses = (_address(joint._constraint) for joint in joints)
             discs.append(_Disc(_address(body._body), *addresses, self.scene.kind_of(number).radius_cm))
@@ -202,8 +211,7 @@ class World:
         polygons = (c_void_p * len(self._polygons))(*(_address(body._body) for body in self._polygons))
         self._world = _World(
             _Chipmunk(*(_address(ffi.addressof(lib, name)) for name in _Chipmunk.NAMES)), _address(self.space._space),
-            self.dt, setting.axle_cm, *forces, len(self._robots), len(self.objects), self._robots, self._discs, 0,
-            polygons, len(polygons),
+            self.dt, len(self._robots), len(self.objects), self._robots, self._discs, 0, polygons, len(polygons),
         )  # fmt: skip
         self._at = addressof(self._world)
         self._wheels = np.zeros((len(self.robots), 2))
@@ -247,31 +255,28 @@ class World:
         self.space.add(body, shape)
         return body
 
-    def _add_robot(self, x: float, y: float, heading: float) -> pymunk.Body:
+    def _add_robot(self, kind: RobotKind, x: float, y: float, heading: float) -> pymunk.Body:
         """Add the body of a robot."""
-        body = self._body(dimensions.ROBOT_MASS, dimensions.ROBOT_RADIUS, x, y)
+        body = self._body(kind.mass_kg, kind.radius_cm, x, y)
         body.angle = heading
         return body
 
-    def _add_drive(self, robot: pymunk.Body) -> pymunk.Body | None:
-        """Add the wheels: a body that moves as commanded and pulls the robot with at most the grip of the tyres."""
-        if math.isinf(self.scene.robots.thrust_n):
+    def _add_drive(self, kind: RobotKind, robot: pymunk.Body) -> pymunk.Body | None:
+        """Add the wheels or legs: a body that moves as commanded and pulls the robot with at most their grip."""
+        drive = self._drives[kind.name]
+        if math.isinf(drive.thrust_n):
             self._joints.append(None)
             return None
         wheels = pymunk.Body(body_type=pymunk.Body.KINEMATIC)
         push = pymunk.PivotJoint(wheels, robot, (0, 0), (0, 0))
         turn = pymunk.GearJoint(wheels, robot, 0.0, 1.0)
         self._joints.append((push, turn))
-        push.max_force, turn.max_force = self._grip(self.scene.robots.thrust_n)
+        push.max_force, turn.max_force = _grip(drive, drive.thrust_n)
         for joint in (push, turn):
             joint.max_bias = 0.0
             self.space.add(joint)
         self.space.add(wheels)
         return wheels
-
-    def _grip(self, force_n: float) -> tuple[float, float]:
-        """Return the greatest force and torque with which the wheels pull or hold a robot."""
-        return dimensions.newton(force_n), dimensions.newton(force_n) * self.scene.robots.axle_cm / 2
 
     def _add_object(self, setting: ObjectKind, x: float, y: float, heading: float = 0.0) -> pymunk.Body:
         """Add an object. Its floor friction is two joints of limited force that hold it at rest."""
@@ -293,7 +298,7 @@ class World:
     # -- one quantum -------------------------------------------------------------------------------------------------
 
     def step(self, wheels: Sequence[tuple[float, float]]) -> None:
-        """Run one quantum with the commanded wheel speeds (left, right) in cm/s."""
+        """Run one quantum with the commanded values (left, right) of each robot's drive."""
         self._draw_noise()
         self._wheels[:] = np.reshape(wheels, (-1, 2))
         self._run_quantum(self._at, self._wheels_at)
@@ -328,7 +333,7 @@ class World:
         """
         native, row = self.native, self._free_row()
         noisy = self.ticks % self._noise_ticks
-        can_run = is_enabled and (noisy or not self.scene.robots.wheel_noise)
+        can_run = is_enabled and (noisy or not any(self._noises))
         more = min(self._noise_ticks - noisy, ROWS - row) if can_run else 0
         native.ticks, native.limit = self.ticks, self.ticks + more
         native.row, native.now, native.before = self._sheet_at + row * self._row_bytes, now.address, before.address
@@ -366,12 +371,12 @@ class World:
         self.poses = self._read()
 
     def _draw_noise(self) -> None:
-        """Draw new wheel noise if its period has ended."""
-        share = self.scene.robots.wheel_noise
-        if not share or self.ticks % self._noise_ticks:
+        """Draw new noise of the drives if its period has ended."""
+        if self.ticks % self._noise_ticks:
             return
-        for robot, rng in zip(self._robots, self._wheel_rng, strict=True):
-            robot.noise[:] = rng.uniform(1 - share, 1 + share, 2).tolist()
+        for robot, rng, share in zip(self._robots, self._wheel_rng, self._noises, strict=True):
+            if share:
+                robot.noise[:] = rng.uniform(1 - share, 1 + share, 2).tolist()
 
     def _read(self) -> Poses:
         """Return the current poses."""

@@ -27,7 +27,7 @@ from arena.camera.lens import lens_of
 from arena.camera.renderer import NEAREST, VOTES, WINDOW_COLUMNS, WINDOW_ROWS
 from arena.scene import dimensions, geometry
 from arena.scene.loader import Scene
-from arena.world.physics import Traits
+from arena.scene.robot_kind import Traits
 from arena.world.poses import Poses
 
 Disc = tuple[float, float, float, float, int]

@@ -11,9 +11,9 @@ import pytest
 
 from arena.camera.appearance import LED_COLOURS, ROBOT, colours_of, led_classes
 from arena.camera.renderer import Renderer
-from arena.campaign.campaign import SELECTOR
 from arena.cli import main
 from arena.infrared.channel import LINES, OpticalChannel
+from arena.robots.epuck import SELECTOR
 from arena.robots.firmware_controller import FirmwareController
 from arena.scene import dimensions
 from arena.scene.loader import Scene, load_scene

@@ -10,10 +10,10 @@ import pytest
 import emu
 from arena.camera.appearance import COLOURS
 from arena.camera.renderer import WINDOW_ROWS
-from arena.campaign.campaign import SELECTOR
 from arena.cli import main
 from arena.commands.reaction import OK_AT_TCY, SPEED_WORDS, AlternatingPicture, reaction
 from arena.robots.controller import FIRST_FRAME_TCY, LATENCY_TCY, OK_DECODED_TCY, ScriptedController, power_on_cycle
+from arena.robots.epuck import SELECTOR
 from arena.robots.firmware_controller import FirmwareController
 from arena.scene.loader import FCY, Scene, load_scene
 from arena.trial.record import read_trial
@@ -21,6 +21,7 @@ from arena.trial.trial import run_trial
 from arena.world.physics import World
 from emu.boards.epuck.board import Epuck
 from tests.arena.reference_camera import ReferenceCamera
+from tests.json_schemas import path_of, problems
 
 AT_ONCE = 8
 """Selector bit with which the project's firmware starts without the remote control."""
@@ -214,6 +215,7 @@ def test_reaction_finds_the_latency_and_no_missed_frame(clustering_image: Path) 
     """experiment-contract.md §4: `arena reaction` gives the reaction times found by polling the wheels, within the
     polling period of 5 us, and no missed frame."""
     found = reaction(clustering_image, SPEED_WORDS["openswarm"], 0, 10, 1)
+    assert problems(path_of("arena", "reaction"), {"openswarm": found}) == []
     assert found["frames_missed"] == 0
     assert found["changes"] in (9, 10)
     assert 50 < found["min_us"] <= found["median_us"] <= found["p99_us"] <= found["max_us"] < 1000

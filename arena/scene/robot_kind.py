@@ -1,0 +1,92 @@
+"""The interface of a kind of robot: its body, its drive, how its robots differ, and the engine of its controllers.
+
+Scenes, placement, physics, cameras, infrared light, trials and replays take everything that depends on the kind from
+here. `KINDS` has the kinds by name; an entry is all that a new kind needs. Lengths cm, masses kg.
+"""
+
+from __future__ import annotations
+
+import importlib
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, Final, NamedTuple
+
+from arena.scene import dimensions
+from arena.scene.schema import Robots
+
+
+class Traits(NamedTuple):
+    """Deviations of one robot from the nominal one.
+
+    `yaw` and `pitch_deg` turn its camera to the left and up. `bias` are factors on the commanded values of its left and
+    right wheel or motor.
+    """
+
+    yaw: float = 0.0
+    pitch_deg: float = 0.0
+    bias: tuple[float, float] = (1.0, 1.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Drive:
+    """How two commanded values, left and right, move a body.
+
+    With an `axle_cm` they are speeds of wheels in cm/s. Without one they are values of two vibration motors: both move
+    the body ahead by `ahead` cm/s per unit of the smaller value, and the rest of the larger one turns it by `turn`
+    rad/s per unit about a leg on the other side, `leg_back_cm` behind and `leg_aside_cm` beside the centre.
+    """
+
+    thrust_n: float
+    """Greatest force on the body while it is driven, N; inf: the body follows without slip."""
+    brake_n: float
+    """Force that pushes a body at rest, N."""
+    lever_cm: float
+    """Lever of both forces for turning."""
+    noise: float = 0.0
+    """Share of the values, drawn every `noise_period_s` from minus to plus this share."""
+    axle_cm: float = 0.0
+    ahead: float = 0.0
+    turn: float = 0.0
+    leg_back_cm: float = 0.0
+    leg_aside_cm: float = 0.0
+
+
+@dataclass(frozen=True)
+class RobotKind:
+    """One kind of robot. `table` names the table of a scene with its settings, the argument of `drive` and `traits`."""
+
+    name: str
+    table: str
+    radius_cm: float
+    mass_kg: float
+    height_cm: float
+    drive: Callable[[Any], Drive]
+    traits: Callable[[Any, Sequence[float]], Traits]
+    """Traits of a robot from four numbers with the standard normal distribution."""
+    engine: str
+    """`module:function` that makes the controllers of all robots of the kind in a trial, with the parameters of
+    `arena.robots.epuck.controllers`. It is loaded when a trial begins: a scene is read without an emulator."""
+    has_camera: bool = False
+
+    def controllers(self, *arguments: Any) -> Sequence[Any]:
+        """Return the controllers of some robots, made by the engine."""
+        module, _, function = self.engine.partition(":")
+        made: Sequence[Any] = getattr(importlib.import_module(module), function)(*arguments)
+        return made
+
+
+def _wheels(setting: Robots) -> Drive:
+    return Drive(setting.thrust_n, setting.brake_n, setting.axle_cm / 2, setting.wheel_noise, setting.axle_cm)
+
+
+def _epuck_traits(setting: Robots, drawn: Sequence[float]) -> Traits:
+    yaw, pitch, left, right = drawn
+    bias = (1.0 + setting.wheel_bias_sd * left, 1.0 + setting.wheel_bias_sd * right)
+    return Traits(math.radians(setting.camera_yaw_sd_deg * yaw), setting.camera_pitch_sd_deg * pitch, bias)
+
+
+EPUCK: Final = RobotKind("epuck", "robots", dimensions.ROBOT_RADIUS, dimensions.ROBOT_MASS, dimensions.ROBOT_HEIGHT,
+                         _wheels, _epuck_traits, "arena.robots.epuck:controllers", has_camera=True)  # fmt: skip
+KINDS: Final[dict[str, RobotKind]] = {EPUCK.name: EPUCK}
+"""The kinds of robots by the name that a scene has for them."""
