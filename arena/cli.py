@@ -15,6 +15,7 @@ from typing import Any, Final
 from arena.commands import COMMANDS
 from emu.host.completion import SHELLS, script
 from emu.host.completion import description as completion_description
+from emu.host.errors import JSON, CommandParser, report_error
 from emu.host.exit_status import BAD_INPUT, CANNOT_CONTINUE, DONE, INTERRUPTED, ignore_unread_output
 from emu.host.front import answer, listing
 
@@ -42,16 +43,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
         options = parser.parse_args(words[1:])
     except SystemExit as ended:  # --help, or an error that argparse has printed
         return ended.code if isinstance(ended.code, int) else BAD_INPUT
-    return _call(run, options)
+    return _call(run, options, JSON in words[1:])
 
 
 def command(name: str) -> Command:
     """Import a command and return its option parser and its function."""
     run: Callable[[argparse.Namespace], Any]
     if name == "scenes":
-        parser, run = argparse.ArgumentParser(description=COMMANDS[name], epilog="example: arena scenes"), _list_scenes
+        parser, run = CommandParser(description=COMMANDS[name], epilog="example: arena scenes"), _list_scenes
     elif name == "completion":
-        parser = argparse.ArgumentParser(description=completion_description("arena"))
+        parser = CommandParser(description=completion_description("arena"))
         parser.epilog = "example: arena completion bash"
         parser.add_argument("shell", choices=SHELLS)
         run = _print_completion
@@ -63,8 +64,8 @@ def command(name: str) -> Command:
     return parser, run
 
 
-def _call(run: Callable[[argparse.Namespace], Any], options: argparse.Namespace) -> int:
-    """Run a command and return its exit status; report errors as one line on standard error."""
+def _call(run: Callable[[argparse.Namespace], Any], options: argparse.Namespace, as_json: bool) -> int:
+    """Run a command and return its exit status; `report_error` reports its errors."""
     from arena.campaign.cluster import ClusterLostError
     from arena.scene.loader import SceneError
     from arena.trial.record import FolderInUseError, RecordError
@@ -75,17 +76,15 @@ def _call(run: Callable[[argparse.Namespace], Any], options: argparse.Namespace)
     except BrokenPipeError:
         raise
     except (FolderInUseError, ClusterLostError) as error:
-        print(f"arena: {error}; finished trials are kept; run the same command to continue", file=sys.stderr)
-        return CANNOT_CONTINUE
+        message = f"arena: {error}; finished trials are kept; run the same command to continue"
+        return report_error(message, CANNOT_CONTINUE, as_json)
     except (SceneError, RecordError, LoadError, ValueError, OSError) as error:
-        print(f"arena: {error}", file=sys.stderr)
-        return BAD_INPUT
+        return report_error(f"arena: {error}", BAD_INPUT, as_json)
     except MemoryError:
-        print("arena: out of memory: an input is too large", file=sys.stderr)
-        return BAD_INPUT
+        return report_error("arena: out of memory: an input is too large", BAD_INPUT, as_json)
     except KeyboardInterrupt:
-        print("arena: interrupted; finished trials are kept; run the same command to continue", file=sys.stderr)
-        return INTERRUPTED
+        message = "arena: interrupted; finished trials are kept; run the same command to continue"
+        return report_error(message, INTERRUPTED, as_json)
 
 
 def _list_scenes(_options: argparse.Namespace) -> int:

@@ -7,6 +7,7 @@ import sys
 from collections.abc import Sequence
 from importlib.metadata import requires
 
+from emu.host.errors import JSON, report_error
 from emu.host.exit_status import BAD_INPUT
 from emu.host.installation import install_command
 
@@ -21,8 +22,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         extra = extra_with(error.name or "")
         if extra is None:
             raise
-        print(f"arena: {error.name} is not installed: {install_command(extra)}", file=sys.stderr)
-        return BAD_INPUT
+        words = sys.argv[1:] if arguments is None else arguments
+        return report_error(f"arena: {error.name} is not installed: {install_command(extra)}", BAD_INPUT, JSON in words)
 
 
 def extra_with(module: str) -> str | None:

@@ -14,6 +14,7 @@ from typing import Final
 
 from emu.commands import COMMANDS
 from emu.host.command import CommandError, Parser
+from emu.host.errors import JSON, report_error
 from emu.host.exit_status import BAD_INPUT, BAD_INPUT_AS_STATUS, DONE, ignore_unread_output
 from emu.host.front import answer, listing
 
@@ -37,27 +38,25 @@ def _answer(words: list[str]) -> int:
 
 
 def _call(name: str, rest: list[str]) -> int:
-    """Parse the options and run a command; report errors as one line on stderr."""
+    """Parse the options and run a command; `report_error` reports its errors."""
     from emu.image.model import LoadError
 
     bad_input = BAD_INPUT_AS_STATUS if "--exit-code" in rest else BAD_INPUT
+    as_json = JSON in rest
     command = import_module(f"emu.commands.{name}")
     parser: Parser = command.parser()
-    parser.arguments = rest
     options = parser.parse_args(rest)
     try:
         status: int = command.run(options)
     except (LoadError, CommandError) as error:
-        print(f"emu {name}: {error}", file=sys.stderr)
-        return bad_input
+        return report_error(f"emu {name}: {error}", bad_input, as_json)
     except BrokenPipeError:
         raise
     except OSError as error:
-        print(f"emu {name}: {f'{error.filename}: ' if error.filename else ''}{error.strerror}", file=sys.stderr)
-        return bad_input
+        where = f"{error.filename}: " if error.filename else ""
+        return report_error(f"emu {name}: {where}{error.strerror}", bad_input, as_json)
     except MemoryError:
-        print(f"emu {name}: out of memory: an input is too large", file=sys.stderr)
-        return bad_input
+        return report_error(f"emu {name}: out of memory: an input is too large", bad_input, as_json)
     except KeyboardInterrupt:
         return DONE
     return status

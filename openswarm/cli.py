@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from importlib import import_module
 from typing import Final, Protocol, cast
 
+from emu.host.errors import JSON, report_error
 from emu.host.exit_status import BAD_INPUT, INTERRUPTED, ignore_unread_output
 from emu.host.front import answer, listing
 
@@ -60,8 +61,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except BrokenPipeError:
         raise
     except (ValueError, OSError) as error:
-        print(f"openswarm {words[0]}: {error}", file=sys.stderr)
-        return BAD_INPUT
+        return report_error(f"openswarm {words[0]}: {error}", BAD_INPUT, JSON in words)
     except KeyboardInterrupt:
         return INTERRUPTED
 

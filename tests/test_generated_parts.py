@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import avr_table
+import json_outputs
 import port_files
 import pytest
 import unverified
 from generated_part import GeneratedPart
 
 
-@pytest.mark.parametrize("script", [avr_table, port_files, unverified], ids=lambda script: script.__name__)
+@pytest.mark.parametrize("script", [avr_table, json_outputs, port_files, unverified], ids=lambda script: script.__name__)
 def test_the_page_is_what_the_script_makes(script) -> None:
     """Each page has the part that its script makes from the tree."""
     assert script.PART.is_current(), f"run: python docs/tools/{script.__name__}.py --write"

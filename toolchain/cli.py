@@ -11,6 +11,7 @@ from importlib import import_module
 from importlib.metadata import version
 from pathlib import Path
 
+from emu.host.errors import JSON, report_error
 from emu.host.exit_status import BAD_INPUT, DONE, INTERRUPTED, ignore_unread_output
 from emu.host.front import answer
 from toolchain.errors import ToolError
@@ -57,11 +58,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         return int(import_module(COMMANDS[words[0]][0]).main(words[1:]) or DONE)
     except ToolError as error:
-        print(error, file=sys.stderr)
-        return BAD_INPUT
+        return report_error(str(error), BAD_INPUT, JSON in words)
     except MemoryError:
-        print(f"toolchain {words[0]}: out of memory: an input is too large", file=sys.stderr)
-        return BAD_INPUT
+        return report_error(f"toolchain {words[0]}: out of memory: an input is too large", BAD_INPUT, JSON in words)
     except KeyboardInterrupt:
         return INTERRUPTED
 

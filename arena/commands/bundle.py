@@ -10,13 +10,14 @@ from arena.campaign import bundle
 from arena.commands.arguments import count, removed_processes
 from arena.commands.trust_options import add_trust_options
 from arena.trial.strict_json import json_text
+from emu.host.errors import CommandParser
 
 DIFFERENT = 1
 
 
 def parser() -> argparse.ArgumentParser:
     """Return the parser of the options of `bundle`."""
-    command = argparse.ArgumentParser(
+    command = CommandParser(
         description="pack runs with their firmware, experiments and manifests into one file, and print its hash",
         epilog="example: arena bundle study.zip results/openswarm-A results/bare-A",
     )
@@ -36,7 +37,7 @@ def run(options: argparse.Namespace) -> int:
 
 def verify_parser() -> argparse.ArgumentParser:
     """Return the parser of the options of `verify`."""
-    command = argparse.ArgumentParser(
+    command = CommandParser(
         description="check the files of a bundle and run some of its trials again; exit status 1 if a result differs",
         epilog="example: arena verify study.zip --trials 1",
     )

@@ -16,6 +16,7 @@ from arena.scene.loader import Scene, load_scene
 from arena.scene.palette import LINES
 from arena.trial.strict_json import json_text
 from arena.world.poses import Poses
+from emu.host.errors import CommandParser
 
 THRESHOLDS: Final = (10.0, 2.0)
 """Amplitudes in ADC counts whose range is drawn.
@@ -29,7 +30,7 @@ NEAR_CM: Final = 10.0
 
 def parser() -> argparse.ArgumentParser:
     """Return the parser of the command's options."""
-    command = argparse.ArgumentParser(
+    command = CommandParser(
         description="print the infrared amplitude between two robots beside the published values, and draw it",
         epilog="example: arena channel --figure docs/figures/infrared-channel.png",
     )

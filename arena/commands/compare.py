@@ -10,11 +10,12 @@ from arena.commands.arguments import duration
 from arena.commands.trust_options import add_trust_options, load_trusted
 from arena.trial.record import trials_in
 from arena.trial.strict_json import json_text
+from emu.host.errors import CommandParser
 
 
 def parser() -> argparse.ArgumentParser:
     """Return the parser of the command's options."""
-    command = argparse.ArgumentParser(
+    command = CommandParser(
         description="compare two runs by equivalence tests",
         epilog="example: arena compare results/clustering-openswarm-A results/clustering-bare-A",
     )

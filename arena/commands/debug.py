@@ -18,6 +18,7 @@ from arena.debug.trial_client import DebugSession, RemoteServer
 from arena.trial.manifest import note_host_time
 from arena.trial.record import RecordError
 from emu.dap.wire import Wire, wire_over
+from emu.host.errors import CommandParser
 from emu.host.exit_status import DONE
 from emu.prompt.reader import Prompt
 
@@ -36,7 +37,7 @@ EXAMPLE: Final = "example: arena debug clustering --robot 2 --port 4711    or   
 
 def parser() -> argparse.ArgumentParser:
     """Return the parser of the command's options."""
-    command = argparse.ArgumentParser(description=DESCRIPTION, epilog=EXAMPLE)
+    command = CommandParser(description=DESCRIPTION, epilog=EXAMPLE)
     add_plan(command)
     command.add_argument("--robot", type=count_or_none, required=True, metavar="N", help="number of the robot, from 0")
     command.add_argument("--port", type=port, metavar="N", help="serve one client on 127.0.0.1:N (0: any free port)")

@@ -14,13 +14,14 @@ from arena.commands import run as single
 from arena.commands.arguments import count, count_or_none, duration
 from arena.commands.run import DEFAULT_CONTROLLER
 from arena.robots.epuck import SELECTOR
+from emu.host.errors import CommandParser
 
 EXAMPLE = "example: arena experiment clustering --document docs/experiment-appendix.md --figures docs/figures"
 
 
 def parser() -> argparse.ArgumentParser:
     """Return the parser of the command's options."""
-    command = argparse.ArgumentParser(
+    command = CommandParser(
         description="run all combinations of brains and controllers, then write the report; finished trials are kept",
         epilog=EXAMPLE,
     )

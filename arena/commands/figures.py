@@ -11,6 +11,7 @@ from arena.analysis.report import by_controller
 from arena.commands import run as single
 from arena.replay import filmstrip
 from arena.trial.record import RecordError, Trial, trials_in
+from emu.host.errors import CommandParser
 
 FILM: Final = ["clustering", "--brain", "openswarm", "--controller", "A", "--trials", "1", "--minutes", "0.5", "--set",
                "clock.sample_s=0.1"]  # fmt: skip
@@ -20,7 +21,7 @@ FILM_ROBOT: Final = 4
 
 def parser() -> argparse.ArgumentParser:
     """Return the parser of the command's options."""
-    command = argparse.ArgumentParser(
+    command = CommandParser(
         description="draw all figures of a study: one set per controller, and the filmstrip of one robot",
         epilog="example: arena figures results --out docs/figures",
     )

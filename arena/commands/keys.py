@@ -11,6 +11,7 @@ from typing import Any, Final, NamedTuple
 
 from arena.scene.schema import LIMITS, LISTS, TABLES
 from arena.trial.strict_json import json_text
+from emu.host.errors import CommandParser
 
 UNITS: Final = {"cm": "cm", "deg": "degrees", "s": "s", "ms": "ms", "us": "us", "tcy": "Tcy", "n": "N", "kg": "kg",
                 "counts": "ADC counts", "share": "share", "volts": "V", "hours": "h"}  # fmt: skip
@@ -45,7 +46,7 @@ class Key(NamedTuple):
 
 def parser() -> argparse.ArgumentParser:
     """Return the parser of the command's options."""
-    command = argparse.ArgumentParser(
+    command = CommandParser(
         description="list the keys of scene files with unit, range and default", epilog="example: arena keys camera"
     )
     command.add_argument("table", nargs="?", help="list only this table, for example robots")

@@ -10,11 +10,12 @@ from arena.commands.arguments import count_or_none
 from arena.commands.trust_options import add_trust_options, load_trusted
 from arena.replay import filmstrip
 from arena.trial.record import Trial, trials_in
+from emu.host.errors import CommandParser
 
 
 def parser() -> argparse.ArgumentParser:
     """Return the parser of the command's options."""
-    command = argparse.ArgumentParser(
+    command = CommandParser(
         description="draw snapshots, clustering over time, trajectories and CPU load",
         epilog="example: arena plot results/clustering-openswarm-A results/clustering-bare-A --out figures",
     )

@@ -21,6 +21,7 @@ from arena.robots.images import image_for
 from arena.scene.loader import FCY
 from arena.trial.strict_json import json_text
 from emu.boards.epuck.board import Epuck
+from emu.host.errors import CommandParser
 
 SPEED_WORDS: Final = {"openswarm": "stepper_left", "bare": "left.0"}
 """Word of each application that holds the speed of the left wheel.
@@ -37,7 +38,7 @@ _ROWS: Final = 480
 
 def parser() -> argparse.ArgumentParser:
     """Return the parser of the command's options."""
-    command = argparse.ArgumentParser(
+    command = CommandParser(
         description="measure the time from the last line of a frame to the new wheel speed, and missed frames",
         epilog="example: arena reaction --brain openswarm --brain bare --frames 300",
     )

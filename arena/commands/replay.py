@@ -16,12 +16,13 @@ from arena.replay.live_feed import Follower
 from arena.replay.page import page
 from arena.replay.video import write_video
 from arena.trial.record import RecordError, read_trial, write_text
+from emu.host.errors import CommandParser
 from emu.host.files import is_standard
 
 
 def parser() -> argparse.ArgumentParser:
     """Return the parser of the command's options."""
-    command = argparse.ArgumentParser(
+    command = CommandParser(
         description="write an HTML page or a video of a trial, or serve a page that follows a running trial",
         epilog="examples: arena replay results/clustering-scripted-A/trial-0001.parquet --out trial.html\n"
         "          arena replay results/clustering-scripted-A/trial-0001.parquet --export trial.gif --speed 60\n"

@@ -14,11 +14,12 @@ from arena.commands.arguments import duration
 from arena.commands.trust_options import add_trust_options, load_trusted
 from arena.trial.manifest import read_manifest
 from arena.trial.record import trials_in, write_text
+from emu.host.errors import CommandParser
 
 
 def parser() -> argparse.ArgumentParser:
     """Return the parser of the command's options."""
-    command = argparse.ArgumentParser(
+    command = CommandParser(
         description="write tables and figures of runs as Markdown, grouped by controller",
         epilog="example: arena report results/openswarm-A results/bare-A results/openswarm-B results/bare-B "
         "--document docs/experiment-appendix.md --figures docs/figures",

@@ -24,6 +24,7 @@ from arena.scene.schema import RobotGroup
 from arena.trial.manifest import note_host_time
 from arena.trial.record import EXPERIMENT, Trial, trials_in, write_bytes
 from arena.trial.strict_json import json_text
+from emu.host.errors import CommandParser
 from emu.host.paths import use_cache
 
 DEFAULT_BRAIN, SCRIPTED, DEFAULT_CONTROLLER = "openswarm", "scripted", "A"
@@ -32,7 +33,7 @@ EXAMPLE = "example: arena run clustering --brain openswarm --controller A --tria
 
 def parser() -> argparse.ArgumentParser:
     """Return the parser of the command's options."""
-    command = argparse.ArgumentParser(description="run trials; finished ones are kept and skipped", epilog=EXAMPLE)
+    command = CommandParser(description="run trials; finished ones are kept and skipped", epilog=EXAMPLE)
     command.add_argument("--trials", type=count, default=10, metavar="N", help="number of trials (default 10)")
     add_plan(command)
     command.add_argument(

@@ -20,6 +20,7 @@ from arena.robots.epuck import SELECTOR
 from arena.scene.loader import load_scene, scripted
 from arena.trial.record import EXPERIMENT, trials_in, write_bytes, write_text
 from arena.trial.strict_json import json_text
+from emu.host.errors import CommandParser
 
 VARIANTS: Final = {
     "as registered": [],
@@ -47,7 +48,7 @@ rows; the second row of the window then shows robots up to 135 cm away."""
 
 def parser() -> argparse.ArgumentParser:
     """Return the parser of the command's options."""
-    command = argparse.ArgumentParser(
+    command = CommandParser(
         description="vary one scene value at a time with scripted robots and print the experiment's first metric",
         epilog="example: arena sensitivity clustering --trials 10 --minutes 10 --save results/sensitivity.md",
     )

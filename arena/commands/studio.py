@@ -24,6 +24,7 @@ from arena.replay.page import page
 from arena.scene.loader import FCY
 from arena.studio.process import Call, Studio
 from arena.studio.session import CommandRefusedError
+from emu.host.errors import CommandParser
 
 EXAMPLE: Final = "example: arena studio clustering --controller A --seed 3"
 LIMIT: Final = 1 << 16
@@ -39,7 +40,7 @@ COMMANDS: Final[dict[str, dict[str, type]]] = {
 
 def parser() -> argparse.ArgumentParser:
     """Return the parser of the command's options."""
-    command = argparse.ArgumentParser(
+    command = CommandParser(
         description="run one trial in a browser page: pause, step, rewind, move robots and objects, inspect firmware",
         epilog=EXAMPLE,
     )

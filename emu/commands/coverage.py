@@ -22,6 +22,7 @@ from emu.instruments.coverage import Counts, CoverageReport, count_executions
 from emu.instruments.coverage_pages import lines_run, outcomes_seen, percent, write_pages
 from emu.instruments.disassembly import items
 from emu.kernel_metrics.owners import APPLICATION, owner_of_module
+from emu.machine.fault import FaultReport
 
 KEYS: Final = ("lines", "branch outcomes")
 DESCRIPTION: Final = """\
@@ -89,7 +90,7 @@ def run(options: argparse.Namespace) -> int:
     if options.counts:
         with atomic_text_file(options.counts) as stream:
             json.dump(counts.facts(image), stream)
-    _print(report, instructions, options.json)
+    _print(report, instructions, options.json, stop.fault)
     if stop.fault is not None:
         print(f"emu coverage: {stop.fault.report()}", file=sys.stderr)
     return FAULT if stop.fault is not None else DONE
@@ -130,8 +131,10 @@ def _matches(name: str, patterns: list[str]) -> bool:
     return any(fnmatch(name, pattern) or fnmatch(name, f"{pattern.rstrip('/')}/*") for pattern in patterns)
 
 
-def _print(report: CoverageReport, instructions: tuple[int, int], as_json: bool) -> None:
-    """Print one row per file and the totals."""
+def _print(
+    report: CoverageReport, instructions: tuple[int, int], as_json: bool, fault: FaultReport | None
+) -> None:
+    """Print one row per file and the totals; as JSON also the firmware's fault."""
     by_file = {name: (lines_run(one), outcomes_seen(one)) for name, one in sorted(report.files.items())}
     totals = {
         "lines": _summed(lines for lines, _ in by_file.values()),
@@ -144,7 +147,7 @@ def _print(report: CoverageReport, instructions: tuple[int, int], as_json: bool)
             name: {key: {"run": part, "all": whole} for key, (part, whole) in zip(KEYS, both, strict=True)}
             for name, both in by_file.items()
         }
-        print(json.dumps(facts))
+        print(json.dumps(facts | ({"fault": fault.facts()} if fault is not None else {})))
         return
     width = max(map(len, (*by_file, "branch outcomes")))
     print(f"{'file':{width}} {'lines':>16} {'':>8} {'branch outcomes':>16}")

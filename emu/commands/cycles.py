@@ -94,8 +94,10 @@ def _application(image: Image, options: argparse.Namespace) -> int:
         "path": image.path, "seconds": result.seconds,
         "operations": {name: one.statistics() for name, one in result.operations.items()},
     }  # fmt: skip
-    status = _finish(command, image, _numbers(result, CodeListing(image)), facts, _text(result))
     fault = result.stop.fault if result.stop is not None else None
+    if fault is not None:
+        facts["fault"] = fault.facts()
+    status = _finish(command, image, _numbers(result, CodeListing(image)), facts, _text(result))
     if fault is not None:
         print(f"emu cycles: {fault.report()}", file=sys.stderr)
         return FAULT

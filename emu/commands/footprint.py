@@ -85,8 +85,9 @@ def run(options: argparse.Namespace) -> int:
         text.append(partial(_options_text, option_sizes))
         numbers = {name: Number(size) for name, size in option_sizes.items()}
     use = _run(image, options) if has_kernel else None
+    fault = use.stop.fault if use is not None and use.stop is not None else None
     if use is not None:
-        facts["run"] = use.facts()
+        facts["run"] = use.facts() | ({"fault": fault.facts()} if fault is not None else {})
         text.append(partial(memory_text, use))
         numbers |= run_numbers(use)
     if options.picture:
@@ -94,7 +95,6 @@ def run(options: argparse.Namespace) -> int:
     status = command.finish(
         numbers, facts, lambda: "\n\n".join(part() for part in text), partial(_blame, image, numbers, use), {}
     )
-    fault = use.stop.fault if use is not None and use.stop is not None else None
     if fault is not None:
         print(f"emu footprint: {fault.report()}", file=sys.stderr)
         return FAULT

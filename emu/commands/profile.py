@@ -76,7 +76,8 @@ def run(options: argparse.Namespace) -> int:
     _write(profile, profiler, image, options)
     fault = profile.stop.fault if profile.stop is not None else None
     if options.json:
-        print(json.dumps(_facts(profile, options.group), indent=2))
+        facts = _facts(profile, options.group) | ({"fault": fault.facts()} if fault is not None else {})
+        print(json.dumps(facts, indent=2))
     else:
         _print(profile, options)
     if fault is not None:

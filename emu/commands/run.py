@@ -116,6 +116,8 @@ def run(options: argparse.Namespace) -> int:
     if options.board == kilobot.BOARD:
         return kilobot.run(options, parser())
     kilobot.refuse_options(options)
+    if options.json and options.dump_native:
+        raise CommandError("only one of --dump-native and --json can use standard output")
     image = image_of(options)
     _print_warnings(image)
     machine = _machine(options, image)

@@ -6,10 +6,10 @@ import argparse
 import contextlib
 import re
 import sys
-from collections.abc import Sequence
 from fractions import Fraction
 from typing import Final, NoReturn
 
+from emu.host.errors import JSON, CommandParser, report_error
 from emu.host.exit_status import BAD_INPUT, BAD_INPUT_AS_STATUS
 
 TEN_YEARS: Final = 10 * 366 * 24 * 3600
@@ -20,7 +20,7 @@ class CommandError(Exception):
     """Error made by the user, reported in one line."""
 
 
-class Parser(argparse.ArgumentParser):
+class Parser(CommandParser):
     """Argument parser that keeps the layout of descriptions. Under `--exit-code` it exits with 126 on errors."""
 
     def __init__(self, command: str, description: str, example: str) -> None:
@@ -31,12 +31,11 @@ class Parser(argparse.ArgumentParser):
             formatter_class=argparse.RawDescriptionHelpFormatter,
             allow_abbrev=False,
         )
-        self.arguments: Sequence[str] = ()
 
     def error(self, message: str) -> NoReturn:
         """Print an error in one line and exit."""
-        print(f"{self.prog}: {message} (see {self.prog} --help)", file=sys.stderr)
-        sys.exit(BAD_INPUT_AS_STATUS if "--exit-code" in self.arguments else BAD_INPUT)
+        status = BAD_INPUT_AS_STATUS if "--exit-code" in self.arguments else BAD_INPUT
+        sys.exit(report_error(f"{self.prog}: {message} (see {self.prog} --help)", status, JSON in self.arguments))
 
 
 def seconds(text: str) -> Fraction:

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable, Collection, Sequence
 
+from emu.host.errors import JSON, report_error
 from emu.host.exit_status import BAD_INPUT, DONE
 
 
@@ -21,8 +21,8 @@ def answer(program: str, words: Sequence[str], commands: Collection[str], usage:
         print(f"{program} {version('openswarm')}")
         return DONE
     if words[0] not in commands:
-        print(f"{program}: unknown command {words[0]!r}; known: {', '.join(commands)}", file=sys.stderr)
-        return BAD_INPUT
+        message = f"{program}: unknown command {words[0]!r}; known: {', '.join(commands)}"
+        return report_error(message, BAD_INPUT, JSON in words)
     return None
 
 

@@ -10,6 +10,7 @@ from collections.abc import Callable
 from dataclasses import asdict
 from typing import Final, Protocol
 
+from emu.host.errors import report_error
 from emu.host.exit_status import DONE, FAULT
 from emu.image.loader import load_image
 from emu.image.model import Image
@@ -160,8 +161,7 @@ def _with_robot(options: argparse.Namespace, job: _Job) -> int:
             job.converse(line, progress)
         except RobotError as error:
             progress.end()
-            print(f"openswarm flash: {error}", file=sys.stderr)
-            return FAULT
+            return report_error(f"openswarm flash: {error}", FAULT, options.json)
         except OSError as error:
             progress.end()
             raise OSError(f"{error}; {progress.reached(job.keeps)}") from None

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Final
 
 from emu.host import paths
+from emu.host.errors import print_json_error
 from emu.host.exit_status import DONE
 from emu.host.files import atomic_text_file
 from emu.image.loader import load_image
@@ -74,6 +75,8 @@ def run(options: argparse.Namespace) -> int:
         words += ["-Xlinker", word]
     status = cc([*words, *options.sources, str(firmware / "board/epuck/update/program/start.S"), "-o", str(output)])
     if status != DONE:
+        if options.json:  # the compiler has printed its messages on standard error
+            print_json_error(f"{output} was not built: errors in its sources", status)
         return status
     image = load_image(str(output))
     made = program_of(image)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 from dataclasses import asdict
+from typing import Any
 
 from toolchain.bounds.annotations.file import FileAnnotations, read_annotation_file
 from toolchain.bounds.interference import SECOND_STACK, BoundsReport, report_of
@@ -16,6 +17,8 @@ from toolchain.errors import ToolError
 from toolchain.files import read_bytes, read_text
 
 EXIT_OVER_LIMIT = 1
+CYCLES, STACK = "cycles", "bytes of stack"
+"""Units of limits."""
 _JSON_KEYS = {
     "unbounded": "open",
     "contradictions": "open",
@@ -81,10 +84,18 @@ def main(arguments: list[str]) -> int:
     image = read_executable(read_bytes(options.image), options.image)
     program = Program(image, dict(_pair("--let", text) for text in options.let), options.without, file)
     report = report_of(program, options.function or program.default_functions(KERNEL))
-    print(json.dumps(_as_data(report), indent=1) if options.json else as_text(report, program))
-    limits = [(_pair("--limit", text), "cycles") for text in options.limit]
-    limits += [(_pair("--stack-limit", text), "bytes of stack") for text in options.stack_limit]
-    return max([_check(report, *limit, what) for limit, what in limits], default=0)
+    limits = [(_pair("--limit", text), CYCLES) for text in options.limit]
+    limits += [(_pair("--stack-limit", text), STACK) for text in options.stack_limit]
+    exceeded = list(filter(None, [_exceeded(report, *limit, what) for limit, what in limits]))
+    if options.json:
+        print(json.dumps(_as_data(report) | {"exceeded": exceeded}, indent=1))
+    else:
+        print(as_text(report, program))
+        for one in exceeded:
+            print(f"{one['name']}: {_number(one['value'])} {one['unit']}, the limit is {one['limit']}")
+            for place, why in sorted(one["reasons"].items()):
+                print(f"  {place}: {why}")
+    return EXIT_OVER_LIMIT if exceeded else 0
 
 
 def _pair(option: str, text: str) -> tuple[str, int]:
@@ -140,15 +151,13 @@ def _number(value: int | None) -> str:
     return "?" if value is None else f"{value:,}"
 
 
-def _check(report: BoundsReport, name: str, limit: int, what: str) -> int:
+def _exceeded(report: BoundsReport, name: str, limit: int, what: str) -> dict[str, Any] | None:
+    """Return the bound of `name` that exceeds its limit, or that is unknown, with reasons; None if the limit holds."""
     rows = [row for row in report.rows if row.name in (name, name.removeprefix("_"))]
     if not rows:
         raise ToolError(f"no analysed function is called {name}")
     row = rows[0]
-    value, reasons = (row.cycles, row.unbounded) if what == "cycles" else (row.stack_bytes, report.unbounded_stacks)
+    value, reasons = (row.cycles, row.unbounded) if what == CYCLES else (row.stack_bytes, report.unbounded_stacks)
     if value is not None and value <= limit:
-        return 0
-    print(f"{name}: {_number(value)} {what}, the limit is {limit}")
-    for place, why in sorted(reasons.items()) if value is None else ():
-        print(f"  {place}: {why}")
-    return EXIT_OVER_LIMIT
+        return None
+    return {"name": name, "unit": what, "value": value, "limit": limit, "reasons": {} if value is not None else reasons}

@@ -11,6 +11,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from emu.host.errors import print_json_error
 from emu.host.exit_status import DONE, FAULT
 from toolchain.commands.parser import parser
 from toolchain.errors import ToolError
@@ -51,6 +52,8 @@ def main(arguments: list[str]) -> int:
     try:
         made = compile_file([options.file, *rest])
     except ClangError:
+        if options.json:  # clang has printed its messages on standard error
+            print_json_error(f"{options.file}: errors in the source", FAULT)
         return FAULT
     if options.function is not None and options.function not in made.module.functions:
         raise ToolError(f"{options.file}: no function {options.function}")

@@ -13,6 +13,7 @@ from arena.campaign import bundle, campaign
 from arena.cli import main
 from arena.trial import versions
 from arena.trial.record import RecordError
+from tests.json_schemas import validated
 
 
 @pytest.fixture(scope="module")
@@ -50,7 +51,7 @@ def test_a_bundle_is_computed_again_to_the_byte(packed: Path, capsys: pytest.Cap
         f"{name}: equal to the byte" for name in ("script, trial 1", "script, trial 2", "talk, trial 1")
     ]
     assert main(["verify", str(packed), "--number", "2", "--json"]) == 0
-    found = json.loads(capsys.readouterr().out)
+    found = validated("arena", "verify", capsys.readouterr().out)
     assert [(one["run"], one["number"], one["equal"]) for one in found["trials"]] == [("script", 2, True)]
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from itertools import pairwise
 from pathlib import Path
 
@@ -12,6 +11,7 @@ from emu.boards.kilobot.messages import Message, PulseDecoder, crc16, frame, pul
 from emu.boards.kilobot.observer import led_of
 from emu.cli import main
 from tests.emu.avr.conftest import Build
+from tests.json_schemas import validated
 
 BLINK = """
 #include <util/delay.h>
@@ -79,7 +79,7 @@ def test_json(build: Build, capsys: pytest.CaptureFixture[str]) -> None:
     """--json gives the same as data, with the limit's reason and status."""
     image = build(BLINK)
     assert main(["run", image.path, "--board", "kilobot", "--json", "--cycles", "100000", "--exit-code"]) == 124
-    told = json.loads(capsys.readouterr().out)
+    told = validated("emu", "run-kilobot", capsys.readouterr().out)
     assert (told["reason"], told["status"], told["engine"]) == ("limit", 124, "avr")
     assert [led["red"] for led in told["led"]] == [3, 1]
     assert told["cycles"] >= 100_000

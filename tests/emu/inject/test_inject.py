@@ -17,6 +17,7 @@ from emu.inject.campaign import CampaignError, read
 from emu.inject.faults import KINDS, Fault, choose_fault, inject_fault
 from emu.inject.report import summary
 from emu.inject.trial import OUTCOMES, Trials
+from tests.json_schemas import validated
 from toolchain.driver.driver import main as compile_program
 
 SOURCE = """
@@ -143,6 +144,10 @@ def test_output_does_not_depend_on_the_number_of_jobs(firmware, capsys):
         assert main([str(word) for word in ["inject", firmware / "main.elf", *words]]) == 0
         written.append(((firmware / f"{name}.csv").read_bytes(), capsys.readouterr().out))
     assert written[0] == written[1]
+    validated("emu", "inject", written[0][1])
+    words = ["inject", firmware / "main.elf", "--campaign", firmware / "campaign.toml", "--only", 0, "--json"]
+    assert main([str(word) for word in words]) == 0
+    assert validated("emu", "inject-only", capsys.readouterr().out)["number"] == 0
     state = firmware / "one.state"
     text = state.read_text()
     state.write_text(text[: len(text) // 2])

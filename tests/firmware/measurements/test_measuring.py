@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from emu.cli import main
+from tests.json_schemas import validated
 
 HERE = Path(__file__).parent
 BASELINES = HERE.parents[2] / "firmware" / "baseline"
@@ -20,7 +21,7 @@ def test_the_memory_equation_fits_every_load_exactly(image, capsys):
     After the load all memory is free again.
     """
     assert main(["footprint", str(image("footprint")), "--json"]) == 0
-    equation = json.loads(capsys.readouterr().out)["equation"]
+    equation = validated("emu", "footprint", capsys.readouterr().out)["equation"]
     assert equation["largest_residual"] == 0
     assert len(equation["cases"]) >= 60
     assert all(case["taken"] == case["counted"] and case["left"] == 0 for case in equation["cases"])
@@ -56,7 +57,7 @@ def test_the_one_number_that_grew_fails_the_check_and_names_the_lines(image, tmp
     path = tmp_path / "cycles.json"
     path.write_text(json.dumps(table))
     assert main(["cycles", "--suite", str(image("latency")), "--check", str(path), "--json"]) == 1
-    check = json.loads(capsys.readouterr().out)["check"]
+    check = validated("emu", "cycles-suite", capsys.readouterr().out)["check"]
     (row,) = [row for row in check["rows"] if row["verdict"] not in ("same", "better")]
     assert (row["name"], row["difference"]) == (name, 1)
     assert [line["amount"] for line in row["lines"]] == [1], function
@@ -67,7 +68,9 @@ def test_an_update_holds_what_was_measured(image, tmp_path, capsys):
     path = tmp_path / "cycles.json"
     assert main(["cycles", "--suite", str(image("options")), "--update", str(path), "--json"]) == 0
     table = json.loads(path.read_text())["rows"]
-    assert {name: row["value"] for name, row in table.items()} == json.loads(capsys.readouterr().out)
+    assert {name: row["value"] for name, row in table.items()} == validated(
+        "emu", "cycles-suite", capsys.readouterr().out
+    )
 
 
 def test_the_suite_needs_one_of_its_applications(image, capsys):

@@ -3,7 +3,6 @@ itself."""
 
 from __future__ import annotations
 
-import json
 import os
 import pty
 import select
@@ -21,6 +20,7 @@ from openswarm.flashing.boot_session import BootSession
 from openswarm.flashing.loaders import LOADERS, ROW_UNITS, block
 from openswarm.flashing.rows import goto, rows
 from tests.firmware.radio import SLICE, Line
+from tests.json_schemas import validated
 
 LOADER = LOADERS[0x91]
 PROGRAM = """
@@ -129,6 +129,6 @@ def test_the_command_flashes_a_robot_behind_a_pseudo_terminal(robot, program, ca
         os.close(master)
         os.close(slave)
     assert status == [0]
-    facts = json.loads(capsys.readouterr().out)
+    facts = validated("openswarm", "flash", capsys.readouterr().out)
     assert (facts["loader"]["name"], facts["rows"]) == ("OpenSwarm's", len(rows(program, LOADER)))
     assert b"it runs\nit runs\n" in said

@@ -5,7 +5,6 @@ Programs that cannot run in the slot are refused.
 
 from __future__ import annotations
 
-import json
 import re
 from pathlib import Path
 
@@ -16,6 +15,7 @@ from emu.host.exit_status import BAD_INPUT, FAULT
 from emu.image.loader import load_image
 from openswarm.cli import main
 from openswarm.flashing.program import RAM, SLOT, is_program, program_of
+from tests.json_schemas import validated
 
 TARGET_APPS = Path(__file__).parents[1] / "target"
 UPDATE = Path(__file__).parents[3] / "firmware" / "openswarm" / "board" / "epuck" / "update"
@@ -60,7 +60,7 @@ def built(folder: Path, text: str, *words: str) -> tuple[int, Path]:
 def test_the_command_tells_what_it_has_made(tmp_path, capsys):
     status, out = built(tmp_path, LAMP, "--json", "--header", str(tmp_path / "my-lamp.h"))
     assert status == 0
-    facts = json.loads(capsys.readouterr().out)
+    facts = validated("openswarm", "program", capsys.readouterr().out)
     program = program_of(load_image(str(out)))
     assert facts == {"program": str(out), "version": 3, "rows": 1, "crc": program.crc, "ram": 0}
     text = (tmp_path / "my-lamp.h").read_text()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import pty
 import select
@@ -21,6 +20,7 @@ from openswarm.flashing.messages import framed, unframed
 from openswarm.flashing.program import SLOT, Program, program_of
 from openswarm.flashing.spreading import HostNeighbour
 from tests.firmware.radio import SLICE, Line
+from tests.json_schemas import validated
 
 ROWS = 3
 
@@ -161,7 +161,7 @@ def test_the_command_reaches_a_running_robot_behind_a_pseudo_terminal(robot, pro
         os.close(master)
         os.close(slave)
     assert status == [0]
-    facts = json.loads(capsys.readouterr().out)
+    facts = validated("openswarm", "flash", capsys.readouterr().out)
     program = of(programs[4])
     assert (facts["version"], facts["rows"], facts["crc"], facts["active"]) == (4, ROWS, program.crc, True)
     run_until_stored(robot, program)

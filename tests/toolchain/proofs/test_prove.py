@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import random
 import re
 from collections.abc import Iterable
@@ -19,6 +18,7 @@ pytest.importorskip("z3", reason="the solver is not installed (extra: test)")
 
 from tests.fuzz.compiler.fuzz_prove import KERNEL_FILES, prove_kernel
 from tests.fuzz.seeds import base_seed
+from tests.json_schemas import validated
 from toolchain.proof.counterexample import image
 from toolchain.proof.problem import compile_file
 from toolchain.proof.prove import Verdict, verdicts
@@ -263,7 +263,7 @@ def test_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     whole = "struct many { int l[9]; }; int whole(struct many m, int n) { while (n--) m.l[n] = n; return m.l[1]; }"
     source.write_text(f"int twice(int a) {{ return 2 * a; }}\n{rounds}\n{listed}\n{whole}\n")
     assert main(["prove", str(source), "-Os", "--json"]) == DONE
-    found = {v["function"]: v for v in json.loads(capsys.readouterr().out)}
+    found = {v["function"]: v for v in validated("toolchain", "prove", capsys.readouterr().out)}
     assert found["twice"]["kind"] == "proved"
     assert not found["twice"]["loops"]
     assert found["rounds"]["kind"] == "proved"
