@@ -115,9 +115,10 @@ class Qemu:
 
     pointer = 4
 
-    def __init__(self, board: Board, image: Path) -> None:
+    def __init__(self, board: Board, image: Path, symbols: Symbols | None = None) -> None:
+        """Start QEMU. symbols: those of the image, if they were read before."""
         self.board = board
-        self.symbols = Symbols(image)
+        self.symbols = symbols or Symbols(image)
         self.now = 0
         self._folder = Path(tempfile.mkdtemp(prefix="openswarm-qemu-"))
         address = str(self._folder / "gdb")

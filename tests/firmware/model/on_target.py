@@ -10,7 +10,7 @@ from pathlib import Path
 from random import Random
 
 import emu
-from firmware.tools.simulated.machine import Stopped, peek, poke_words
+from firmware.tools.simulated.machine import Stopped, Symbols, peek, poke_words
 from firmware.tools.simulated.qemu import Board, Qemu
 from tests.firmware.model.compare import Difference
 from tests.firmware.model.executor import Executor
@@ -108,14 +108,14 @@ class CpuInQemu(Comparison):
     heap = HEAP_IN_QEMU
 
     def __init__(self, board: Board, image: Path) -> None:
-        self.board, self.image = board, image
+        self.board, self.image, self.symbols = board, image, Symbols(image)
         with closing(self.started()) as machine:
             self.sizes = Sizes(*(peek(machine, "port_sizes", 2 * i) for i in range(len(Sizes.__dataclass_fields__))))
         self.base = self.run(Program(), 1)[0][7]
 
     def started(self) -> Qemu:
         """Return a CPU that waits for its program."""
-        machine = Qemu(self.board, self.image)
+        machine = Qemu(self.board, self.image, self.symbols)
         machine.run_to("machine_ready")
         return machine
 
