@@ -23,7 +23,7 @@ from toolchain.frontend.options import HELP, CcOptions, Input, parse
 if TYPE_CHECKING:
     from toolchain.asm.state import Options as AssemblerOptions
     from toolchain.driver.link_stage import LinkInput
-    from toolchain.frontend.clang import Job
+    from toolchain.frontend.clang import ClangJob
 
 FrontEnd = Callable[[CcOptions, Path], dict[Input, bytes]]
 IR_SOURCES = {"c", "cpp-output", "c++", "c++-cpp-output"}
@@ -134,7 +134,7 @@ def front_end(options: CcOptions, scratch: Path) -> dict[Input, bytes]:
     return modules
 
 
-def _compile(options: CcOptions, jobs: dict[Input, Job]) -> dict[Input, bytes]:
+def _compile(options: CcOptions, jobs: dict[Input, ClangJob]) -> dict[Input, bytes]:
     """IR of the sources of front-end jobs; with -fcache-ir, that of unchanged C files is read from the cache."""
     from toolchain.driver.ir_cache import IrCache, dependency_flags, is_cacheable
     from toolchain.frontend.clang import run_jobs
@@ -159,7 +159,7 @@ def _compile(options: CcOptions, jobs: dict[Input, Job]) -> dict[Input, bytes]:
     return found
 
 
-def _ir_of(options: CcOptions, job: Job) -> bytes:
+def _ir_of(options: CcOptions, job: ClangJob) -> bytes:
     """IR of the source of a front-end job that has run."""
     from toolchain.abi.struct_alignment import mark
     from toolchain.frontend import short_double

@@ -1,8 +1,11 @@
 """IR of unchanged C files from the cache (-fcache-ir).
 
-The key of an entry is the hash of the compiler, the folder, the flags, and the source file with its content. The entry
-names the headers that clang read, with their hashes. It also names the files that would be other headers of the same
-name: a new file there could be the one that clang reads instead. An entry is valid while nothing of this differs.
+The key of an entry is the hash of the compiler, the flags, and the source file with its content. Folders count as debug
+information names them: checkouts and installations in several places share entries.
+
+The entry names the headers that clang read, with their hashes. It also names the files that would be other headers of
+the same name: a new file there could be the one that clang reads instead. An entry is valid while nothing of this
+differs.
 
 Not cached: sources with messages, dependency files (-MD), and sources or headers whose meaning depends on the time or
 on the existence of other files (`__TIME__`, `__has_include`).
@@ -24,7 +27,7 @@ from typing import Final
 from emu.host.disk_cache import DiskCache
 from emu.host.paths import front_end_results
 from toolchain.driver.runtime_archive import fingerprint
-from toolchain.frontend.clang import INCLUDE_DIR, Job, builtin_include_dir
+from toolchain.frontend.clang import INCLUDE_DIR, ClangJob, builtin_include_dir
 from toolchain.frontend.options import CcOptions, Input
 
 LIMIT_BYTES: Final = 64 << 20
@@ -32,12 +35,12 @@ COMPRESSION: Final = 1
 """Level of zlib: the fastest."""
 VARYING: Final = (b"__DATE__", b"__TIME__", b"__TIMESTAMP__", b"__has_include", b"__has_embed")
 """Words of a source whose meaning depends on more than the content of files."""
-PREFIX_MAP: Final = re.compile(r"-f(?:file|debug|macro)-prefix-map=([^=]*)=")
+PREFIX_MAP: Final = re.compile(r"-f(file|debug)-prefix-map=([^=]*)=(.*)")
 SEARCH_FLAGS: Final = ("-I", "-iquote", "-isystem", "-idirafter")
 ENVIRONMENT: Final = ("CPATH", "C_INCLUDE_PATH", "SOURCE_DATE_EPOCH")
 DEPENDENCY: Final = re.compile(r"(?:\\[^\n]|[^\s\\])+")
-OWN_HEADERS: Final = (str(INCLUDE_DIR), str(builtin_include_dir()))
-"""Folders whose headers test only for each other's existence."""
+OWN_HEADERS: Final = {str(INCLUDE_DIR): "<toolchain>", str(builtin_include_dir()): "<clang>"}
+"""Folders whose headers test only for each other's existence, with the names that keys and entries contain instead."""
 
 
 class IrCache:
@@ -49,23 +52,23 @@ class IrCache:
         self._varies: dict[str, bool] = {}
         self._hashes: dict[str, str | None] = {}
         self._present: dict[str, bool] = {}
-        self._here: Final = os.getcwd()
+        self._here: Final = _working_folder()
         self._started: Final = time.time()
 
-    def find(self, job: Job) -> bytes | None:
+    def find(self, job: ClangJob) -> bytes | None:
         """Return the IR of the source of a front-end job; None if there is no valid entry."""
         entry = self.store.get(self._key(job))
         if entry is None:
             return None
         head, _, packed = entry.partition(b"\n")
-        record = json.loads(head)
+        record = json.loads(_absolute(head.decode()))
         if any(self._hash(path) != digest for path, digest in record["headers"].items()):
             return None
         if self._others(record["headers"], record["folders"], record["names"]) != record["others"]:
             return None
         return zlib.decompress(packed)
 
-    def add(self, job: Job, dependencies: str, ir: bytes) -> None:
+    def add(self, job: ClangJob, dependencies: str, ir: bytes) -> None:
         """Store the IR of a job; `dependencies` is the rule that clang's -MD has written.
 
         A file that has changed since the run began is not what clang has read; then nothing is stored.
@@ -77,33 +80,28 @@ class IrCache:
             return
         if any(self._is_varying(path) for path in read):
             return
-        if any(self._begins_with(path, old) for old in self._unused_maps(job) for path in headers):
-            return
         folders = sorted({os.path.dirname(path) or "." for path in read} | set(_search_folders(job)))
+        maps = [old for _, old, _ in _prefix_maps(job) if old not in folders and old.startswith(tuple(folders))]
+        if any(path.startswith(old) for path in headers for old in maps):  # the key does not tell how it is named
+            return
         names = {path[len(folder) + 1 :] for folder in folders for path in headers if path.startswith(f"{folder}/")}
         names |= {os.path.basename(path) for path in headers}
         record = {"headers": hashes, "folders": folders, "names": sorted(names),
                   "others": self._others(headers, folders, sorted(names))}  # fmt: skip
-        self.store.put(self._key(job), json.dumps(record).encode() + b"\n" + zlib.compress(ir, COMPRESSION))
+        head = _portable(json.dumps(record))
+        self.store.put(self._key(job), head.encode() + b"\n" + zlib.compress(ir, COMPRESSION))
 
-    def _key(self, job: Job) -> str:
+    def _key(self, job: ClangJob) -> str:
         """Return the key of a job without the paths of its outputs."""
-        unused = self._unused_maps(job)
         *given, _, _ = job.arguments  # without -o OUTPUT
-        words = [word for word in given if not ((found := PREFIX_MAP.match(word)) and found[1] in unused)]
+        words = [word for word in given if not PREFIX_MAP.match(word)]
+        maps = _prefix_maps(job)
+        named = [_mapped(path, [one for one in maps if one[0] in kinds])
+                 for kinds in (("file",), ("file", "debug"))
+                 for path in (self._here, str(job.source), *_search_folders(job))]  # fmt: skip
         environment = [f"{name}={os.environ.get(name)}" for name in ENVIRONMENT]
-        text = "\0".join([self._here, job.chip.name, *environment, *words])
+        text = _portable("\0".join([job.chip.name, *named, *environment, *words]))
         return self.store.key(text.encode(errors="surrogateescape"), _content(str(job.source)))
-
-    def _unused_maps(self, job: Job) -> set[str]:
-        """Return the prefixes of -ffile-prefix-map= that no path of the job has, unless a header has one."""
-        prefixes = {found[1] for word in job.arguments if (found := PREFIX_MAP.match(word))}
-        used = [self._here, str(job.source), *_search_folders(job)]
-        return {old for old in prefixes if not any(self._begins_with(path, old) for path in used)}
-
-    def _begins_with(self, path: str, old: str) -> bool:
-        """Whether a path, absolute or as it is written, begins with a text."""
-        return path.startswith(old) or os.path.join(self._here, path).startswith(old)
 
     def _others(self, headers: Iterable[str], folders: list[str], names: list[str]) -> list[str]:
         """Return the existing files that have the name of a header in another folder."""
@@ -115,7 +113,7 @@ class IrCache:
         """Whether the meaning of a file depends on the time or on the existence of files."""
         found = self._varies.get(path)
         if found is None:
-            content = b"" if path.startswith(OWN_HEADERS) else _content(path)
+            content = b"" if path.startswith(tuple(OWN_HEADERS)) else _content(path)
             found = self._varies[path] = any(word in content for word in VARYING)
         return found
 
@@ -142,7 +140,41 @@ def dependency_flags(output: Path) -> list[str]:
     return ["-MD", "-MF", str(output), "-MT", "ir"]
 
 
-def _search_folders(job: Job) -> list[str]:
+def _working_folder() -> str:
+    """Return the working folder as clang names it: $PWD if that is the folder."""
+    named = os.environ.get("PWD", "")
+    return named if os.path.isabs(named) and os.path.exists(named) and os.path.samefile(named, ".") else os.getcwd()
+
+
+def _prefix_maps(job: ClangJob) -> list[tuple[str, str, str]]:
+    """Return kind, old and new text of the prefix maps of a job."""
+    matches = [PREFIX_MAP.match(word) for word in job.arguments]
+    return [(found[1], found[2], found[3]) for found in matches if found]
+
+
+def _mapped(path: str, maps: list[tuple[str, str, str]]) -> str:
+    """Return a path with its prefix replaced by the last map that matches, as clang does."""
+    for _, old, new in reversed(maps):
+        if path.startswith(old):
+            return new + path[len(old) :]
+    return path
+
+
+def _portable(text: str) -> str:
+    """Return a text with names instead of the folders of own headers."""
+    for folder, name in OWN_HEADERS.items():
+        text = text.replace(folder, name)
+    return text
+
+
+def _absolute(text: str) -> str:
+    """Return the text of which `_portable` has made this one."""
+    for folder, name in OWN_HEADERS.items():
+        text = text.replace(name, folder)
+    return text
+
+
+def _search_folders(job: ClangJob) -> list[str]:
     """Return the folders of the options of a job in which clang searches headers."""
     words = job.arguments
     folders = [after for word, after in pairwise(words) if word in SEARCH_FLAGS]

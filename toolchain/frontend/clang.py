@@ -83,7 +83,7 @@ class ClangError(Exception):
 
 
 @dataclass(frozen=True)
-class Job:
+class ClangJob:
     """One clang run: its arguments and its input file."""
 
     arguments: list[str]
@@ -176,13 +176,13 @@ def _dependency_flags(options: CcOptions, item: Input) -> list[str]:
     return flags
 
 
-def ir_job(options: CcOptions, item: Input, output: Path) -> Job:
+def ir_job(options: CcOptions, item: Input, output: Path) -> ClangJob:
     """Job that compiles one C file to unoptimised IR text with the attributes of the level."""
     arguments = [*front_end_flags(options, item.language), *_dependency_flags(options, item)]
     arguments += [*LAYOUT_FLAGS, "-Xclang", "-disable-llvm-passes", "-emit-llvm", "-S"]
     arguments += annotated_lines.definitions(item.path)
     arguments += ["-x", item.language, str(item.path)]
-    return Job([*arguments, "-o", str(output)], item.path, output.with_suffix(".layouts"), options.chip)
+    return ClangJob([*arguments, "-o", str(output)], item.path, output.with_suffix(".layouts"), options.chip)
 
 
 def with_i32_levels(ir: bytes) -> bytes:
@@ -192,7 +192,7 @@ def with_i32_levels(ir: bytes) -> bytes:
     return ir
 
 
-def preprocess_job(options: CcOptions, item: Input, output: Path | None) -> Job:
+def preprocess_job(options: CcOptions, item: Input, output: Path | None) -> ClangJob:
     """Job for -E, -M and -fsyntax-only; output None is standard output."""
     arguments = [*front_end_flags(options, item.language), *_dependency_flags(options, item)]
     if item.language == "assembler-with-cpp":
@@ -200,16 +200,16 @@ def preprocess_job(options: CcOptions, item: Input, output: Path | None) -> Job:
     if "-fsyntax-only" not in options.clang and not {"-M", "-MM"} & set(options.dependency):
         arguments.append("-E")
     arguments += ["-x", item.language, str(item.path)]
-    return Job(arguments if output is None else [*arguments, "-o", str(output)], item.path)
+    return ClangJob(arguments if output is None else [*arguments, "-o", str(output)], item.path)
 
 
-def optimise_job(options: CcOptions, module: Path, output: Path) -> Job:
+def optimise_job(options: CcOptions, module: Path, output: Path) -> ClangJob:
     """Job that runs clang's middle end on a module."""
     passed = [flag for flag in options.clang if flag.startswith(("-funroll", "-fno-unroll", "-ffast", "-fno-inline"))]
     if options.level != "2":  # clang replaces a CRC loop of eight iterations by a table of 256 words
         passed += ["-mllvm", "-disable-loop-idiom-hashrecognize"]
     arguments = [*TARGET_FLAGS, CLANG_LEVEL[options.level], *passed, "-Wno-override-module", "-x", "ir"]
-    return Job([*arguments, "-S", "-emit-llvm", str(module), "-o", str(output)], module)
+    return ClangJob([*arguments, "-S", "-emit-llvm", str(module), "-o", str(output)], module)
 
 
 def _run_changed(program: list[str], arguments: list[str], changes: list[Change]) -> subprocess.CompletedProcess[bytes]:
@@ -230,7 +230,7 @@ def _run_changed(program: list[str], arguments: list[str], changes: list[Change]
     return subprocess.run([*program, *second], capture_output=True, check=False)
 
 
-def _run_job(program: list[str], job: Job) -> subprocess.CompletedProcess[bytes]:
+def _run_job(program: list[str], job: ClangJob) -> subprocess.CompletedProcess[bytes]:
     """Run clang, and again with changed text if the source uses XC16 features that clang does not support."""
     arguments = job.arguments
     compiles = job.printed is not None  # a job that compiles a source to IR
@@ -252,7 +252,7 @@ def _run_job(program: list[str], job: Job) -> subprocess.CompletedProcess[bytes]
     return result
 
 
-def _changes_of(job: Job) -> list[Change]:
+def _changes_of(job: ClangJob) -> list[Change]:
     """The changes that the text of the source file itself needs, whatever its headers contain."""
     try:
         source = job.source.read_bytes()
@@ -264,7 +264,7 @@ def _changes_of(job: Job) -> list[Change]:
     return changes
 
 
-def _changes_for(result: subprocess.CompletedProcess[bytes], job: Job) -> list[Change]:
+def _changes_for(result: subprocess.CompletedProcess[bytes], job: ClangJob) -> list[Change]:
     """The changes of the text that clang's messages ask for."""
     said, failed = result.stderr, result.returncode != 0
     changes: list[Change] = []
@@ -295,7 +295,7 @@ def without_preprocessing(options: list[str]) -> list[str]:
     return out
 
 
-def run_jobs(jobs: list[Job], parallel: int, show: bool = False) -> list[bool]:
+def run_jobs(jobs: list[ClangJob], parallel: int, show: bool = False) -> list[bool]:
     """Run jobs, at most `parallel` at once (0: one per core); diagnostics appear in the order of the jobs.
 
     Return whether each job had no diagnostics. With `show`, the commands are printed first. Raises ClangError after the
@@ -308,7 +308,7 @@ def run_jobs(jobs: list[Job], parallel: int, show: bool = False) -> list[bool]:
         for job in jobs:
             print(shlex.join([*program, *job.arguments]), file=sys.stderr)
 
-    def run(job: Job) -> subprocess.CompletedProcess[bytes]:
+    def run(job: ClangJob) -> subprocess.CompletedProcess[bytes]:
         return _run_job([*program, *colour], job)
 
     with ThreadPoolExecutor(max_workers=parallel or os.cpu_count() or 1) as pool:

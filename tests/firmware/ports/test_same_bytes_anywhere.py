@@ -33,8 +33,8 @@ def checkout(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def built(root: Path, scratch: Path, app: str, *words: str) -> Path:
-    """Build an application of a checkout with the cache of a scratch folder: the shared one has a run-time library of
-    this checkout, which would hide differences."""
+    """Build an application of a checkout with the cache of a scratch folder: the shared one has a run-time library and
+    IR of this checkout, which would hide differences."""
     out = scratch / root.name / app
     command = ["make", "-C", str(root / "firmware"), f"APP={app}", f"OUT={out}", f"PYTHON={sys.executable}", *words]
     environment = os.environ | {"OPENSWARM_CACHE": str(scratch / "cache")}
@@ -47,7 +47,7 @@ def built(root: Path, scratch: Path, app: str, *words: str) -> Path:
 def test_two_checkouts_of_one_commit_build_the_same_bytes(checkout: Path, image: Build) -> None:
     """Two checkouts of one commit build identical bytes from C, assembly, inline functions and library, all with -g.
 
-    This checkout's image is that of all tests, for which kernel and drivers are compiled once per run.
+    This checkout's image is that of all tests, which share the IR of kernel and drivers in the cache.
     """
     one = image("clustering").read_bytes()
     assert built(checkout, checkout.parent, "clustering").read_bytes() == one

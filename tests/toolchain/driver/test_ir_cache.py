@@ -24,7 +24,7 @@ class Compiled:
         self.runs: list[str] = []
         original = clang.run_jobs
 
-        def run_jobs(jobs: list[clang.Job], parallel: int, show: bool = False) -> list[bool]:
+        def run_jobs(jobs: list[clang.ClangJob], parallel: int, show: bool = False) -> list[bool]:
             self.runs += [job.source.name for job in jobs if job.source.suffix == ".c"]
             return original(jobs, parallel, show)
 
@@ -39,7 +39,7 @@ class Compiled:
     def write(self, name: str, text: str) -> None:
         """Write a file that is older than the run, as a file is that a user has saved before the build."""
         path = self.folder / name
-        path.parent.mkdir(exist_ok=True)
+        path.parent.mkdir(exist_ok=True, parents=True)
         path.write_text(text)
         os.utime(path, (time.time() - 60,) * 2)
 
@@ -97,11 +97,24 @@ def test_a_file_changed_during_the_run_is_not_cached(compiled: Compiled) -> None
     assert compiled()[0] == ["main.c"]
 
 
-def test_the_prefix_of_other_folders_does_not_matter(compiled: Compiled) -> None:
-    """-ffile-prefix-map= of a folder in which no source, header or search folder lies."""
-    assert compiled("-ffile-prefix-map=/absent/one=x")[0] == BOTH
-    assert compiled("-ffile-prefix-map=/absent/two=x")[0] == []
-    assert compiled(f"-ffile-prefix-map={compiled.folder}/=")[0] == BOTH
+def test_copies_in_other_folders_share_entries(compiled: Compiled, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Relative paths, and -ffile-prefix-map= of the working folder; without the map, debug information names it."""
+    images = []
+    for name in ("one", "two"):
+        folder = compiled.folder / name
+        for part in (*BOTH, "late/limit.h", "late/size.h"):
+            compiled.write(f"{name}/{part}", (compiled.folder / part).read_text())
+        monkeypatch.chdir(folder)
+        for recorded in ("here", "there"):
+            compiled.runs.clear()
+            words = ["-fcache-ir", "-g", "-Ilate", *BOTH, "-o", "a.elf", f"-ffile-prefix-map={folder}={recorded}"]
+            assert driver.main(words) == 0
+            images.append((sorted(compiled.runs), (folder / "a.elf").read_bytes()))
+        compiled.runs.clear()
+        assert driver.main(["-fcache-ir", "-g", "-Ilate", *BOTH, "-o", "a.elf"]) == 0
+        assert sorted(compiled.runs) == BOTH
+    assert [runs for runs, _ in images] == [BOTH, BOTH, [], []]
+    assert images[0][1] == images[2][1] != images[1][1] == images[3][1]
 
 
 def test_a_damaged_cache_is_not_used(compiled: Compiled) -> None:
