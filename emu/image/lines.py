@@ -2,7 +2,7 @@
 
 Input: raw octets of debug sections. Output: file and line per address. Microchip's tools store every DWARF byte as
 two octets (byte, phantom 0); this project's tools do so in objects and on request. Plain DWARF is also accepted.
-Unreadable debug information causes a warning, never an error.
+Unreadable debug information is ignored.
 """
 
 from __future__ import annotations
@@ -10,8 +10,10 @@ from __future__ import annotations
 import inspect
 import io
 from bisect import bisect_right
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, Final
 
 if TYPE_CHECKING:
@@ -52,15 +54,14 @@ def remove_phantom_octets(sections: Mapping[str, bytes]) -> dict[str, bytes]:
 
 
 class LineTable:
-    """Line table of an image. `broken` is the number of compilation units that could not be read."""
+    """Line table of an image, without the compilation units that cannot be read."""
 
     def __init__(self, sections: Mapping[str, bytes]) -> None:
-        self.broken = 0
-        self.files: Final[dict[int, str]] = {}
-        """Source file of each variable, by data address."""
         self.rows: Final[list[SourceLine]] = []
-        if all(sections.get(name) for name in _NEEDED):
-            self._read(sections)
+        self._sections: Final = sections if all(sections.get(name) for name in _NEEDED) else {}
+        for dwarf, unit in self._units():
+            with suppress(Exception):
+                self.rows.extend(_unit_rows(dwarf, unit))
         self.rows.sort(key=lambda row: (row.start, row.end))
         self._starts: Final = [row.start for row in self.rows]
 
@@ -74,27 +75,32 @@ class LineTable:
             return self.rows[index]
         return None
 
-    def _read(self, sections: Mapping[str, bytes]) -> None:
+    @cached_property
+    def files(self) -> dict[int, str]:
+        """Source file of each variable, by data address."""
+        found: dict[int, str] = {}
+        for dwarf, unit in self._units():
+            with suppress(Exception):
+                found.update(_variables(dwarf, unit))
+        return found
+
+    def _units(self) -> Iterator[tuple[DWARFInfo, Any]]:
         # pyelftools raises many unrelated exceptions for damaged input, so each unit is read separately.
+        if not self._sections:
+            return
         try:
-            dwarf = dwarf_of(sections)
+            dwarf = dwarf_of(self._sections)
             units = dwarf.iter_CUs()
         except Exception:
-            self.broken += 1
             return
         while True:
             try:
                 unit = next(units, None)
             except Exception:
-                self.broken += 1
                 return
             if unit is None:
                 return
-            try:
-                self.rows.extend(_unit_rows(dwarf, unit))
-                self.files.update(_variables(dwarf, unit))
-            except Exception:
-                self.broken += 1
+            yield dwarf, unit
 
 
 def dwarf_of(sections: Mapping[str, bytes]) -> DWARFInfo:

@@ -52,7 +52,7 @@ def _statement(asm: Assembler, line: str) -> None:
         _skip(asm, line)
         return
     position = 0
-    while match := _LABEL.match(line, position):
+    while ":" in line and (match := _LABEL.match(line, position)):
         asm.define_label(match[1])
         position = match.end()
     if position:

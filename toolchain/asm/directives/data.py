@@ -16,6 +16,9 @@ from toolchain.files import read_bytes
 
 Handler = Callable[[Assembler, str], None]
 
+_NUMBER = re.compile(r"0|[1-9][0-9]*|0x[0-9A-Fa-f]+")
+"""The most frequent operands, which need no parser. A leading 0 starts an octal number, which `int` would refuse."""
+
 # Relocation of a datum by its size in bytes and its operator ("": none) (abi-elf.md §5).
 _DATA_KINDS: dict[int, dict[str, str]] = {
     1: {"": "8"},
@@ -91,7 +94,7 @@ def _integers(size: int, packed: bool = False) -> Handler:
         if packed and size == 3:
             asm.section.align_word()
         for part in split_arguments(text, spaces=False) or [""]:
-            value = asm.evaluate(part)
+            value = int(part, 0) if _NUMBER.fullmatch(part) else asm.evaluate(part)
             if isinstance(value, int):
                 if not plain.low <= value <= plain.high:
                     raise _range_error(value, plain)
