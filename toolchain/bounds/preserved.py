@@ -22,7 +22,7 @@ PUSH_MODE, POP_MODE = 3, 4
 """Encodings of the addressing modes [Wn++] and [--Wn] (isa.md §3.1)."""
 
 
-class Content(IntEnum):
+class RegisterContent(IntEnum):
     """Content of a register within a function, relative to its value at entry."""
 
     ENTRY = 0
@@ -35,18 +35,18 @@ class Content(IntEnum):
     """Another value; the value at entry is not saved on some path."""
 
 
-Contents = tuple[Content, ...]
-_WRITTEN: Final = {Content.ENTRY: Content.LOST, Content.SAVED: Content.CHANGED}
-_RESTORED: Final = {Content.ENTRY: Content.LOST, Content.CHANGED: Content.SAVED}
+Contents = tuple[RegisterContent, ...]
+_WRITTEN: Final = {RegisterContent.ENTRY: RegisterContent.LOST, RegisterContent.SAVED: RegisterContent.CHANGED}
+_RESTORED: Final = {RegisterContent.ENTRY: RegisterContent.LOST, RegisterContent.CHANGED: RegisterContent.SAVED}
 
 
-def _join(a: Content, b: Content) -> Content:
+def _join(a: RegisterContent, b: RegisterContent) -> RegisterContent:
     if a == b:
         return a
     pair = {a, b}
-    if pair == {Content.ENTRY, Content.SAVED}:
-        return Content.ENTRY
-    return Content.CHANGED if pair == {Content.SAVED, Content.CHANGED} else Content.LOST
+    if pair == {RegisterContent.ENTRY, RegisterContent.SAVED}:
+        return RegisterContent.ENTRY
+    return RegisterContent.CHANGED if pair == {RegisterContent.SAVED, RegisterContent.CHANGED} else RegisterContent.LOST
 
 
 class PreservedRegisters:
@@ -87,7 +87,7 @@ class PreservedRegisters:
         return before != [self._changed[function] for function in functions]
 
     def _function(self, code: FunctionGraph) -> frozenset[int]:
-        start: Contents = (Content.ENTRY,) * (STACK - FIRST)
+        start: Contents = (RegisterContent.ENTRY,) * (STACK - FIRST)
         states = {code.entry: start} if code.entry in code.blocks else {}
         work = list(states)
         changed: set[int] = set()
@@ -97,7 +97,7 @@ class PreservedRegisters:
             for step in block.steps:
                 now = self._step(code, step, now)
             if not block.following:
-                changed |= {FIRST + k for k, content in enumerate(now) if content >= Content.CHANGED}
+                changed |= {FIRST + k for k, content in enumerate(now) if content >= RegisterContent.CHANGED}
             for after in block.following:
                 joined = tuple(map(_join, states[after], now)) if after in states else now
                 if states.get(after) != joined:
@@ -115,8 +115,8 @@ class PreservedRegisters:
         new = list(now)
         for k, content in enumerate(now):
             number = FIRST + k
-            if number in saved and content == Content.ENTRY:
-                new[k] = content = Content.SAVED
+            if number in saved and content == RegisterContent.ENTRY:
+                new[k] = content = RegisterContent.SAVED
             if number in restored:
                 new[k] = _RESTORED.get(content, content)
             elif number in written:

@@ -66,9 +66,9 @@ class _RecordFlow:
         for k, record in enumerate(f.dbg_records):
             if record.kind != "dbg_declare":
                 self.of.setdefault(record.block, []).append(k)
-        self.sunk = self._sunk()
+        self.replaced = self._replaced_records()
 
-    def _sunk(self) -> dict[int, set[int]]:
+    def _replaced_records(self) -> dict[int, set[int]]:
         """The records that each record of a moved value replaces; the middle end has moved the value to a later place.
 
         The middle end moves a record with its value, even past a later assignment to the variable. At the old place it
@@ -91,7 +91,7 @@ class _RecordFlow:
     def apply(self, k: int, known: ValidRecords) -> None:
         """Update the valid records by record `k`."""
         name = self.records[k].variable
-        if k in self.sunk and known.get(name) not in {k, *self.sunk[k]}:
+        if k in self.replaced and known.get(name) not in {k, *self.replaced[k]}:
             known.pop(name, None)
         else:
             known[name] = k

@@ -134,7 +134,7 @@ class Legalizer(MemoryLegalizer):
 
     def translate(self, i: Instr) -> LegalResult:
         """Translate one instruction without recording its value."""
-        if wide_integers.concerns(i):
+        if wide_integers.is_wide(i):
             return wide_integers.translate(self, i)
         handler = HANDLERS.get(i.op)
         if handler is None:

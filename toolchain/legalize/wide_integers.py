@@ -15,7 +15,7 @@ WORD = 16
 OWN_HANDLER = frozenset(("select", "freeze", "phi", "call", "ret"))
 
 
-def concerns(i: Instr) -> bool:
+def is_wide(i: Instr) -> bool:
     """Whether an instruction computes with wide integers and is translated here."""
     return i.op not in OWN_HANDLER and (i.type.kind == "wide" or any(a.type.kind == "wide" for a in i.args))
 

@@ -73,7 +73,7 @@ def _link(objects: list[ObjectFile], archives: list[Archive], options: LinkOptio
     outputs = build_outputs(
         placement.layout, _relocate(relocator, placement, options), options.fill_upper, options.debug_phantoms
     )
-    entry = relocator.target(synthesize.wanted(options.entry)).address
+    entry = relocator.target(synthesize.undefined_symbol(options.entry)).address
     image = build_executable(inputs.resolution, outputs, relocator, entry, options.chip.processors[0])
     messages = _foreign_processors(objects, options.chip) + _missing_heap(inputs)
     return Linked(image, inputs.resolution, placement.layout, outputs, placement.records, inputs.live, stack, messages)

@@ -34,7 +34,7 @@ def _goto(section: Section, symbol: Symbol) -> None:
     section.relocs += [Reloc(at, _LSB, symbol), Reloc(at + OCTETS_PER_WORD, _MSB, symbol)]
 
 
-def wanted(name: str) -> Symbol:
+def undefined_symbol(name: str) -> Symbol:
     """Return an undefined global symbol, to which a relocation refers."""
     return Symbol(name, Home.UNDEFINED, bind=Bind.GLOBAL)
 
@@ -42,7 +42,7 @@ def wanted(name: str) -> Symbol:
 def reset_section(entry: str) -> Section:
     """Return the reset section, a GOTO to `entry` at address 0 (abi-elf.md §3.1)."""
     section = Section(".reset", CODE)
-    _goto(section, wanted(entry))
+    _goto(section, undefined_symbol(entry))
     return section
 
 
@@ -61,7 +61,7 @@ def vector_tables(resolution: Resolution, filled: bool) -> tuple[Section, Sectio
         for table, names in zip(tables, choices, strict=True):
             name = next((n for n in names if n in resolution.globals), "__DefaultInterrupt" if filled else "")
             if name:
-                table.relocs.append(Reloc(len(table.data), _PADDR, wanted(name)))
+                table.relocs.append(Reloc(len(table.data), _PADDR, undefined_symbol(name)))
             table.data += words_octets(0)
     return tables
 

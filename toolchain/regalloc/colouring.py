@@ -312,7 +312,7 @@ def allocate(m: MFunction, for_size: bool, verify: bool = False) -> MFunction:
         trial = m.clone()
         _allocate(trial, eager, thorough, verify, untouched.of_copy(trial))
         trials.append((_cost(trial, for_size), number, trial))
-        if not number and not _crowded(trial):
+        if not number and not _is_improvable(trial):
             return trial
     return min(trials, key=lambda t: t[:2])[2]
 
@@ -348,7 +348,7 @@ def _no_room(m: MFunction, registers: set[int]) -> UnsupportedError:
     return error
 
 
-def _crowded(m: MFunction) -> bool:
+def _is_improvable(m: MFunction) -> bool:
     """Whether an allocation contains copies or writes callee-saved registers, which another trial may avoid."""
     return any(mi.is_copy() or any(r in CALLEE_SAVED for r in mi.defs()) for b in m.blocks for mi in b.insts)
 
