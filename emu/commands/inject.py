@@ -172,7 +172,7 @@ def _begin(options: argparse.Namespace, campaign: Campaign) -> None:
     _PROCESS_TRIALS[:] = [_trials(image_of(options), campaign)]
 
 
-def _one(number: int) -> Outcome:
+def _run_trial(number: int) -> Outcome:
     return _PROCESS_TRIALS[0].run(number)
 
 
@@ -181,8 +181,8 @@ def _run(options: argparse.Namespace, campaign: Campaign, numbers: list[int]) ->
         return
     _begin(options, campaign)  # here, so that this process reports errors of the golden run
     if options.jobs == 1:
-        yield from map(_one, numbers)
+        yield from map(_run_trial, numbers)
         return
     image_options = argparse.Namespace(image=options.image, chip=options.chip)
     with get_context("spawn").Pool(options.jobs, _begin, (image_options, campaign)) as pool:
-        yield from pool.imap_unordered(_one, numbers, chunksize=4)
+        yield from pool.imap_unordered(_run_trial, numbers, chunksize=4)

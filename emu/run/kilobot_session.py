@@ -78,9 +78,9 @@ def run_kilobot(
         while limit is None or swarm.now < limit:
             ends = [end for end in (swarm.now + CHUNK, limit, next_command) if end is not None]
             swarm.run_until(min(ends))
-            _report(run, observer.take(machine.changes), show)
+            _report(run, observer.reports_of(machine.changes), show)
             machine.changes.clear()
-            _report(run, observer.settle(machine.cycle), show)
+            _report(run, observer.settled_states(machine.cycle), show)
             if swarm.now == next_command:
                 next_command = _send(swarm, command)
             if machine.state.halted and next_command is None:
@@ -88,7 +88,7 @@ def run_kilobot(
                 break
     except KilobotFaultError:
         run.reason, run.fault = "fault", machine.fault
-        _report(run, observer.take(machine.changes), show)
+        _report(run, observer.reports_of(machine.changes), show)
     except KeyboardInterrupt:
         run.reason = "interrupted"
     _report(run, observer.end(), show)

@@ -71,7 +71,7 @@ def motors_of(registers: dict[int, int]) -> tuple[int, int]:
     return left, right
 
 
-def _is_reset(before: int, now: int) -> bool:
+def is_reset(before: int, now: int) -> bool:
     """Whether MCUSR has changed by a watchdog reset, which sets WDRF. A program can only clear bits."""
     return now & 1 << WDRF != 0 and now & before == before
 
@@ -90,13 +90,13 @@ class KilobotObserver:
         self._text = bytearray()
         self._text_at = 0
 
-    def take(self, changes: Iterable[Change]) -> Iterator[Report]:
+    def reports_of(self, changes: Iterable[Change]) -> Iterator[Report]:
         """Yield the reports of changes."""
         for change in changes:
-            yield from self.settle(change.cycle)
-            yield from self._one(change)
+            yield from self.settled_states(change.cycle)
+            yield from self._report_change(change)
 
-    def settle(self, cycle: int) -> Iterator[Report]:
+    def settled_states(self, cycle: int) -> Iterator[Report]:
         """Yield the states of LED and motors that have lasted long enough at a cycle."""
         due = sorted((since, kind) for kind, (since, _) in self._waiting.items() if cycle - since >= SETTLED)
         for since, kind in due:
@@ -117,7 +117,7 @@ class KilobotObserver:
         names = ("red", "green", "blue") if kind == "led" else ("left", "right")
         yield Report(since, kind, dict(zip(names, state, strict=True)))
 
-    def _one(self, change: Change) -> Iterator[Report]:
+    def _report_change(self, change: Change) -> Iterator[Report]:
         if change.register == UDR0:
             if not self._text:
                 self._text_at = change.cycle
@@ -126,7 +126,7 @@ class KilobotObserver:
                 yield Report(self._text_at, "uart", {"text": self._text.decode("latin-1")})
                 self._text.clear()
             return
-        if change.register == MCUSR and _is_reset(self._registers.get(MCUSR, 0), change.value):
+        if change.register == MCUSR and is_reset(self._registers.get(MCUSR, 0), change.value):
             self._registers.clear()
             yield Report(change.cycle, "reset", {"cause": "watchdog"})
         was_lit = self._is_lit()

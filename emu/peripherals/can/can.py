@@ -80,9 +80,9 @@ class Can(Peripheral):
         mode = self.ctrl["REQOP"]
         self.ctrl["OPMODE"] = mode
         if mode in (_NORMAL, _LOOPBACK):  # the module drives CiTX; the idle level is recessive
-            self._tx_port.own_now(self._tx_pin, drive=True, level=1)
+            self._tx_port.claim_now(self._tx_pin, drive=True, level=1)
         else:
-            self._tx_port.release(self._tx_pin)
+            self._tx_port.release_now(self._tx_pin)
         self._start_next(due)
 
     # -- transmit ----------------------------------------------------------------------------------------------------
@@ -226,7 +226,7 @@ class Can(Peripheral):
 
     def release_pins(self) -> None:
         """Return the CiTX pin to LAT and TRIS."""
-        self._tx_port.disown(self._tx_pin)
+        self._tx_port.release(self._tx_pin)
 
     def reset(self, power_on: bool) -> None:
         """Reset to configuration mode (CiCTRL = 0x0480)."""

@@ -156,10 +156,10 @@ class I2c(Peripheral):
         for flag in ("S", "P", "TBF", "TRSTAT"):
             self.stat[flag] = 0
         if on:
-            self._port.own(lines, drive=False, level=0)
+            self._port.claim(lines, drive=False, level=0)
             self.stat["P"] = self.wire.sda_high and self.wire.scl_high
         else:
-            self._port.disown(lines)
+            self._port.release(lines)
         self.restored()
 
     def _invalidate_pins(self) -> None:
@@ -336,7 +336,7 @@ class I2c(Peripheral):
 
     def release_pins(self) -> None:
         """Return SDA and SCL to LAT and TRIS."""
-        self._port.disown(self.wire.sda | self.wire.scl)
+        self._port.release(self.wire.sda | self.wire.scl)
 
     def reset(self, power_on: bool) -> None:
         """Reset to off. The port has already released the lines."""

@@ -73,7 +73,7 @@ class Port(Peripheral):
         self._own_level.value = 0
         self._drive(self.now)
 
-    def own(self, mask: int, drive: bool, level: int) -> None:
+    def claim(self, mask: int, drive: bool, level: int) -> None:
         """Take pins for a peripheral from the next cycle on.
 
         Drive them with `level` if `drive`, else leave them undriven.
@@ -83,12 +83,12 @@ class Port(Peripheral):
         self._own_level.value = self._own_level.value & ~mask | (mask if level else 0)
         self._drive(self.now + 1)
 
-    def release(self, mask: int) -> None:
+    def release_now(self, mask: int) -> None:
         """Return pins to LAT and TRIS in the current cycle. Events call this."""
         self._owned.value &= ~mask
         self._drive(self.now)
 
-    def own_now(self, mask: int, drive: bool, level: int) -> None:
+    def claim_now(self, mask: int, drive: bool, level: int) -> None:
         """Take pins for a peripheral in the current cycle. Events call this."""
         self._owned.value |= mask
         self._own_drive.value = self._own_drive.value & ~mask | (mask if drive else 0)
@@ -102,7 +102,7 @@ class Port(Peripheral):
         self._own_level.value = self._own_level.value & ~mask | levels & owned
         self._drive(cycle)
 
-    def disown(self, mask: int) -> None:
+    def release(self, mask: int) -> None:
         """Return pins to LAT and TRIS from the next cycle on."""
         self._owned.value &= ~mask
         self._drive(self.now + 1)

@@ -185,9 +185,9 @@ class Dci(Peripheral):
         self.stat["TUNF"] = 0
         for role, drive in (("csdi", False), ("csdo", True), ("csck", not self.con1["CSCKD"])):
             port, pin = self._pins[role]
-            self._ports[port].own(pin, drive, 0)
+            self._ports[port].claim(pin, drive, 0)
         port, pin = self._pins["cofs"]
-        self._ports[port].own(pin, not self.con1["COFSD"], 0)
+        self._ports[port].claim(pin, not self.con1["COFSD"], 0)
         self._post(self.now + 1, 0)
 
     def _finish_frame(self) -> None:
@@ -210,7 +210,7 @@ class Dci(Peripheral):
     def _release(self) -> None:
         self.events.cancel(self._word_event)
         for port, pin in self._pins.values():
-            self._ports[port].disown(pin)
+            self._ports[port].release(pin)
 
     def reset(self, power_on: bool) -> None:
         """Reset to off. The flags have already been reset with DCISTAT."""

@@ -69,7 +69,7 @@ def push(m: RuleBuilder, s: SpiOperands, value: Number, lanes: int) -> bool:
     return True
 
 
-def take(m: RuleBuilder, s: SpiOperands) -> Number:
+def read_buffer(m: RuleBuilder, s: SpiOperands) -> Number:
     """Read BUF, which empties RXB."""
     m.put(s.stat, m.get(s.stat) & (0xFFFF & ~s.bit["SPIRBF"]))
     return m.get(s.received)

@@ -23,7 +23,7 @@ from emu.peripherals.spi.rules import (
     fire,
     open_end,
     push,
-    take,
+    read_buffer,
     waits_to_begin,
     word_bits,
 )
@@ -61,8 +61,8 @@ class Spi(Peripheral):
         self._step: Final = self.slot("step", self._due)
         self._operands: Final = self._rule_operands()
         integers, operands = self.bus.integers, self._operands
-        self.buf.set_rule(Rule(operands, writes=push, reads_with_effect=take))
-        self.buf.read_by(lambda: take(integers, operands))
+        self.buf.set_rule(Rule(operands, writes=push, reads_with_effect=read_buffer))
+        self.buf.read_by(lambda: read_buffer(integers, operands))
         self.buf.written_by(self._push)
         self.set_event_rule(self._step, Rule(operands, fires=fire))
 
@@ -143,15 +143,15 @@ class Spi(Peripheral):
         """Take or return the pins as SPIEN requires: SCK, SDI and, unless DISSDO is set, SDO (§12)."""
         if not self.stat["SPIEN"]:
             for port, pin in self._pins.values():
-                self._ports[port].disown(pin)
+                self._ports[port].release(pin)
         else:
             roles = {"sck": bool(self.con["MSTEN"]), "sdi": False, "sdo": not self.con["DISSDO"]}
             for role, drive in roles.items():
                 port, pin = self._pins[role]
                 if role == "sdo" and not drive:
-                    self._ports[port].disown(pin)
+                    self._ports[port].release(pin)
                 else:
-                    self._ports[port].own(pin, drive, self.con["CKP"] if role == "sck" else 0)
+                    self._ports[port].claim(pin, drive, self.con["CKP"] if role == "sck" else 0)
         self.restored()
         port, following = self._pins["sck"][0], self.now + 1
         self.context.pins.log_level(following, port, self._waveform_pins(), self.bits(following))

@@ -116,7 +116,7 @@ class Compare(Peripheral):
 
     def _drive(self, level: bool) -> None:
         self._level.value = level
-        self._port.own_now(self._pin, drive=True, level=level)
+        self._port.claim_now(self._pin, drive=True, level=level)
 
     # -- control -----------------------------------------------------------------------------------------------------
 
@@ -133,12 +133,12 @@ class Compare(Peripheral):
         self.con["OCFLT"] = 0
         self.restored()
         if mode == _OFF:
-            self._port.disown(self._pin)
+            self._port.release(self._pin)
             return
         preset = mode == _TOGGLE and bool(self._port.lat.value & self._pin)  # UNVERIFIED (§9)
         self._level.value = mode == _CLEAR_ONCE or preset
         self._phase.value = _RISE
-        self._port.own(self._pin, drive=True, level=self._level.value)
+        self._port.claim(self._pin, drive=True, level=self._level.value)
         if mode == _PWM_FAULT and not self.context.pins.level[self._fault_port] & self._fault_pin:
             self._fault()
         else:
@@ -153,7 +153,7 @@ class Compare(Peripheral):
         self.con["OCFLT"] = 1
         self._phase.value = _DONE
         self.events.cancel(self._pin_event)
-        self._port.own(self._pin, drive=False, level=0)
+        self._port.claim(self._pin, drive=False, level=0)
         self._line.request()
 
     def reset(self, power_on: bool) -> None:
@@ -175,7 +175,7 @@ class Compare(Peripheral):
 
     def release_pins(self) -> None:
         """Return the channel's pin to LAT and TRIS."""
-        self._port.disown(self._pin)
+        self._port.release(self._pin)
 
     def restored(self) -> None:
         """Listen to changes of the time base if the channel is on, otherwise stop listening."""

@@ -406,7 +406,7 @@ class Uart(Peripheral):
         if (old ^ new) & enable:
             if new & enable:
                 self._clock.value = self.now + 1
-                self._rx_port.own(self._rx_pin, drive=False, level=0)
+                self._rx_port.claim(self._rx_pin, drive=False, level=0)
                 self._transmitter_switched(self.is_sending_enabled)
                 self._switch_break(bool(self.sta["UTXBRK"]) and self.is_sending_enabled)
             else:
@@ -431,14 +431,14 @@ class Uart(Peripheral):
         """Enable or disable the transmitter, which is on while UARTEN and UTXEN are both 1 (§10.1)."""
         self.restored()
         if on:
-            self._tx_port.own(self._tx_pin, drive=True, level=1)
+            self._tx_port.claim(self._tx_pin, drive=True, level=1)
             self._interrupts.line(self.site.tx_irq).request()
             if self._tx_count.value:
                 self._clock.value = self.now + 1
                 self.events.set(self._tx_event, self.now + 1)
             return
         self._switch_break(False)
-        self._tx_port.disown(self._tx_pin)
+        self._tx_port.release(self._tx_pin)
         self._tx_count.value = 0
         self._shifting.value = 0
         self._start.value = self._end.value = NEVER
@@ -449,7 +449,7 @@ class Uart(Peripheral):
     def _abort(self) -> None:
         """Handle UARTEN = 0: clear FIFOs, flags and the baud counter; keep MODE and BRG (§10.1)."""
         self._transmitter_switched(False)
-        self._rx_port.disown(self._rx_pin)
+        self._rx_port.release(self._rx_pin)
         self._rx_count.value = 0
         self._held.value = 0
         self._stop_receiving()
@@ -465,8 +465,8 @@ class Uart(Peripheral):
 
     def release_pins(self) -> None:
         """Return TX and RX to LAT and TRIS."""
-        self._tx_port.disown(self._tx_pin)
-        self._rx_port.disown(self._rx_pin)
+        self._tx_port.release(self._tx_pin)
+        self._rx_port.release(self._rx_pin)
 
     def _brg_written(self, old: int, _new: int, _lanes: int) -> None:
         """Handle a write to BRG. The baud counter restarts (§10), so the current bit lasts one more bit time.

@@ -76,7 +76,7 @@ def test_two_robots_exchange_messages(program: Program) -> None:
         swarm.run(2.0)
         assert [robot.peek("gradient") for robot in swarm.robots] == [0, 1]
         assert abs(swarm.robots[1].peek("distance") - gap) <= 1
-        sent = [report for report in observer.take(sender.changes) if report.kind == "message"]
+        sent = [report for report in observer.reports_of(sender.changes) if report.kind == "message"]
         assert len(sent) in (3, 4)
         assert {report.content["data"] for report in sent} == {"00" * 9}
         assert {report.content["crc"] for report in sent} == {"right"}
