@@ -57,7 +57,7 @@ CALL_BYTES = 4
 
 
 @dataclass
-class Row:
+class BoundsRow:
     """One call in one image: cycles of its longest run and of its bound, and the maximum sizes of all structures
     during that run. Values are None if the call is absent or always disturbed."""
 
@@ -94,7 +94,7 @@ def _merge(into: dict[str, int], found: dict[str, int]) -> None:
 
 
 @dataclass
-class Meter:
+class CallMeter:
     """Timer of calls on a running machine, which also records the maxima of all structures during each call."""
 
     machine: emu.Machine
@@ -178,10 +178,10 @@ def build(app: str, apps: str, out: Path) -> Path:
     return out / "firmware.elf"
 
 
-def measure(path: Path, program: Program, names: list[str], seconds: float) -> Meter:
+def measure(path: Path, program: Program, names: list[str], seconds: float) -> CallMeter:
     """Return the longest run of each function, plain and not, and the maxima of all structures during it."""
     machine = emu.load(path)
-    meter = Meter(machine, Structures(machine))
+    meter = CallMeter(machine, Structures(machine))
     for handler, _, _ in program.interrupts():
         machine.hook_pc(handler, meter.discard_calls)
     for hooked, hook in ((SWITCHES, meter.discard_calls), (APART, meter.mark_not_plain)):
@@ -212,7 +212,7 @@ def _extent(program: Program, name: str) -> range:
     return range(start, min(entry for entry in program.calls.entries if entry > start))
 
 
-def rows_of(app: str, path: Path, values: dict[str, int], seconds: float) -> list[Row]:
+def rows_of(app: str, path: Path, values: dict[str, int], seconds: float) -> list[BoundsRow]:
     """Return the rows of all kernel calls in one image."""
     image = read_executable(path.read_bytes(), str(path))
     bare = Program(image, values)
@@ -230,7 +230,7 @@ def rows_of(app: str, path: Path, values: dict[str, int], seconds: float) -> lis
 
     rows = []
     for name in names:
-        row = Row(app, name.lstrip("_"))
+        row = BoundsRow(app, name.lstrip("_"))
         plain = seen.get((name, True))
         longest = max((seen[name, kind] for kind in (True, False) if (name, kind) in seen), key=_cycles, default=None)
         if longest is not None:
@@ -243,7 +243,7 @@ def rows_of(app: str, path: Path, values: dict[str, int], seconds: float) -> lis
     return rows
 
 
-def table(rows: list[Row]) -> str:
+def table(rows: list[BoundsRow]) -> str:
     """Return the table as Markdown."""
 
     def ratio(bound: int | None, seen: int | None) -> str:
@@ -275,7 +275,7 @@ def main() -> int:
     parser.add_argument("--image", action="append", choices=IMAGES, help="only this one (default: all)")
     parser.add_argument("--json", action="store_true", help="machine-readable output")
     options = parser.parse_args()
-    rows: list[Row] = []
+    rows: list[BoundsRow] = []
     with tempfile.TemporaryDirectory(prefix="bounds-") as folder:
         for app in options.image or IMAGES:
             apps, seconds, values = IMAGES[app]

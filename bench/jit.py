@@ -154,7 +154,7 @@ EMULATORS = {
 }
 
 
-def others(folder: Path, repeat: int) -> tuple[dict[str, float], list[str]]:
+def other_emulators(folder: Path, repeat: int) -> tuple[dict[str, float], list[str]]:
     """Return rounds of compute.c per host second in other emulators, without their start-up, and notes on missing
     ones."""
     found: dict[str, float] = {}
@@ -189,7 +189,7 @@ def main() -> int:
             report[image]["two"] = two_at_once(folder / f"{image}.elf", cycles)
             report[image]["cold_s"], report[image]["warm_s"] = compile_seconds(folder / f"{image}.elf")
         ours = report["compute"]["jit"] * MIPS / cycles_per_round(folder / "rounds.elf", 50)
-        rates, notes = others(folder, options.repeat)
+        rates, notes = other_emulators(folder, options.repeat)
         report["rounds_per_s"] = {"jit": ours, **rates}
         report["notes"] = notes
     if options.json:

@@ -46,7 +46,7 @@ class Seen:
 
 
 @dataclass
-class Row:
+class StackRow:
     """One stack (bytes) or handler (cycles) of an application; the bound is None if it is not known."""
 
     app: str
@@ -143,26 +143,27 @@ class Observer:
                 self.seen.handlers[name] = max(self.seen.handlers.get(name, 0), self.machine.cycle - start)
 
 
-def rows_of(app: str, image: Path, cycles: int, values: Mapping[str, int] = VALUES) -> list[Row]:
+def rows_of(app: str, image: Path, cycles: int, values: Mapping[str, int] = VALUES) -> list[StackRow]:
     """Return the rows of one image: every stack, and every handler that occurred."""
     executable = read_executable(image.read_bytes(), str(image))
     program = Program(executable, values)
     report = report_of(program, ["main"])
     seen = Observer(image, program).run(cycles)
     bounds = {row.name: row.cycles for row in report.interrupts}
-    rows = [Row(app, name, "bytes", bound, seen.stacks.get(name, 0)) for name, bound in report.stacks.items()]
+    rows = [StackRow(app, name, "bytes", bound, seen.stacks.get(name, 0)) for name, bound in report.stacks.items()]
     users = [row for row in report.rows if row.name in report.stacks]
     rows += [
-        Row(app, f"{user.name} alone", "bytes", RETURN_ADDRESS + user.bytes if user.stack_is_known else None,
+        StackRow(app, f"{user.name} alone", "bytes", RETURN_ADDRESS + user.bytes if user.stack_is_known else None,
             seen.alone.get(user.name, 0))
         for user in users
     ]  # fmt: skip
     return rows + [
-        Row(app, name, "cycles", bounds[name.removeprefix("_")], most) for name, most in sorted(seen.handlers.items())
+        StackRow(app, name, "cycles", bounds[name.removeprefix("_")], most)
+        for name, most in sorted(seen.handlers.items())
     ]
 
 
-def table(rows: list[Row]) -> str:
+def table(rows: list[StackRow]) -> str:
     """Return the table as Markdown, with the median ratio of the stacks."""
     lines = ["| application | stack or handler | bound | measured | unit | ratio |", "|---|---|---|---|---|---|"]
     for row in rows:
@@ -182,7 +183,7 @@ def main() -> int:
     parser.add_argument("--json", action="store_true", help="machine-readable output")
     options = parser.parse_args()
     names = options.app or sorted(path.parent.name for path in APPS.glob("*/main.c"))
-    rows: list[Row] = []
+    rows: list[StackRow] = []
     with tempfile.TemporaryDirectory(prefix="stacks-") as folder:
         for app in names:
             rows += rows_of(app, build(app, "apps", Path(folder) / app), options.cycles)

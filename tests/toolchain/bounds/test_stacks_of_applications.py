@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from bench.stacks import RETURN_ADDRESS, Row, rows_of, table
+from bench.stacks import RETURN_ADDRESS, StackRow, rows_of, table
 from tests.firmware.conftest import Build, image
 from tests.fuzz.compiler.fuzz_bounds import examine
 from toolchain.bounds.preserved import PreservedRegisters
@@ -23,7 +23,7 @@ CYCLES = 900_000
 __all__ = ["image"]
 
 
-def exceeded(rows: list[Row]) -> list[str]:
+def exceeded(rows: list[StackRow]) -> list[str]:
     return [row.name for row in rows if row.bound is not None and row.seen > row.bound]
 
 
