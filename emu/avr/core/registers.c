@@ -237,6 +237,7 @@ static void timer_register_write(struct avr *m, u32 n, u32 address, u32 value, u
 {
     timer_sync(m, n, at);
     timer_write(m, address, value);
+    turn_at_top(m, n);
     timer_schedule(m, n);
 }
 

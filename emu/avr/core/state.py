@@ -93,6 +93,7 @@ FIELDS: Final[tuple[tuple[str, str, int], ...]] = (
     ("prescaler_start", _U64, 2),  # cycle of the last reset of the prescaler: of T0 and T1, of T2
     ("timer_at", _U64, TIMERS),  # cycle for which the count is valid
     ("timer_position", _U32, TIMERS),  # phase within the period
+    ("timer_turn", _U16, TIMERS),  # count at which a dual-slope timer turned; 0: it counts up
     ("timer_compare", _U16, TIMERS * 2),  # active compare values; written values may wait for the period's update
     ("timer_buffer", _U16, TIMERS * 2),
     ("timer_capture", _U16, 1),

@@ -108,7 +108,7 @@ static void reset_cpu(struct avr *m, u32 cause)
     m->asleep = m->shadow = m->halted = 0;
     m->sleep_from = NEVER;
     for (u32 n = 0; n < TIMERS; n++) {
-        m->timer_at[n] = m->cycle, m->timer_position[n] = 0, m->timer_blocked[n] = 0;
+        m->timer_at[n] = m->cycle, m->timer_position[n] = m->timer_turn[n] = 0, m->timer_blocked[n] = 0;
         m->timer_compare[2 * n] = m->timer_compare[2 * n + 1] = 0;
         m->timer_buffer[2 * n] = m->timer_buffer[2 * n + 1] = 0;
     }

@@ -1,7 +1,8 @@
 // Timer/counters 0, 1 and 2 (data sheet, chapters on 8-bit and 16-bit timers and on the prescaler).
 //
 // A timer costs nothing while it runs: its count is computed when it is read or written, or when an enabled interrupt
-// is due. The phase of a single-slope timer is its count; that of a dual-slope one runs from 0 over TOP to 2 TOP.
+// is due. The phase of a single-slope timer is its count; that of a dual-slope one runs from 0 over TOP to 2 TOP. There
+// `timer_turn` keeps the count at which it turned: TOP may change while it counts down.
 
 enum { OVERFLOW = 1, COMPARE_A = 2, COMPARE_B = 4, CAPTURE = 32 }; // bits of TIFRn and TIMSKn
 
@@ -50,20 +51,28 @@ static u64 ticks_until(const struct avr *m, u32 n, int shift, u64 at)
     return (at - m->prescaler_start[n == 2]) >> shift;
 }
 
-// The next point of the period at which flags change, in `ticks` from now. There the flags `flags` are set, the compare
-// values written meanwhile take effect if `updates`, and the position becomes 0 if `wraps`.
+// The count at which a dual-slope timer turns or has turned.
+static u32 turn_of(const struct avr *m, u32 n, const struct waveform *w)
+{
+    return m->timer_turn[n] ? m->timer_turn[n] : w->top ? w->top : 1;
+}
+
+enum { AT_BOTTOM = 1, AT_TOP = 2 };
+
+// The next point of the period at which flags change, in `ticks` from now. There the flags `flags` are set, and the
+// compare values written meanwhile take effect if `updates`. At the bottom the position becomes 0.
 struct milestone {
     u64 ticks;
-    u32 flags, updates, wraps;
+    u32 flags, updates, place;
 };
 
-static void consider(struct milestone *next, u64 ticks, u32 flags, u32 updates, u32 wraps)
+static void consider(struct milestone *next, u64 ticks, u32 flags, u32 updates, u32 place)
 {
     if (ticks > next->ticks)
         return;
     if (ticks < next->ticks)
         *next = (struct milestone){ticks, 0, 0, 0};
-    next->flags |= flags, next->updates |= updates, next->wraps |= wraps;
+    next->flags |= flags, next->updates |= updates, next->place |= place;
 }
 
 static u64 ahead(u32 from, u32 to, u32 period)
@@ -79,15 +88,15 @@ static struct milestone next_milestone(const struct avr *m, u32 n, const struct 
     if (w->kind < PHASE_PWM) { // single slope; a flag is set when the count leaves the compare value
         u32 last = position <= w->top ? w->top : w->max;
         int at_max = last == w->max;
-        consider(&next, last - position + 1, w->kind == FAST_PWM || at_max ? OVERFLOW : 0, w->kind == FAST_PWM, 1);
+        consider(&next, last - position + 1, w->kind == FAST_PWM || at_max ? OVERFLOW : 0, w->kind == FAST_PWM, AT_BOTTOM);
         for (u32 c = 0; c < 2; c++)
             if (m->timer_compare[2 * n + c] >= position && m->timer_compare[2 * n + c] <= last)
                 consider(&next, m->timer_compare[2 * n + c] - position + 1, COMPARE_A << c, 0, 0);
         return next;
     }
-    u32 top = w->top ? w->top : 1, period = 2 * top;
-    consider(&next, ahead(position, 0, period), 0, w->kind == FREQUENCY_PWM, 1);
-    consider(&next, ahead(position, top, period), 0, w->kind == PHASE_PWM, 0);
+    u32 top = turn_of(m, n, w), period = 2 * top;
+    consider(&next, ahead(position, 0, period), 0, w->kind == FREQUENCY_PWM, AT_BOTTOM);
+    consider(&next, ahead(position, top, period), 0, w->kind == PHASE_PWM, AT_TOP);
     consider(&next, ahead(position, 1, period), OVERFLOW, 0, 0);
     for (u32 c = 0; c < 2; c++) {
         u32 value = m->timer_compare[2 * n + c];
@@ -101,15 +110,22 @@ static struct milestone next_milestone(const struct avr *m, u32 n, const struct 
 
 static void start_conversion_by(struct avr *m, u32 source, u64 at);
 
+static void move_to(struct avr *m, u32 n, const struct milestone *next)
+{
+    m->timer_position[n] = next->place & AT_BOTTOM ? 0 : m->timer_position[n] + (u32)next->ticks;
+    if (next->place)
+        m->timer_turn[n] = next->place & AT_TOP ? (u16)m->timer_position[n] : 0;
+    if (next->updates)
+        for (u32 c = 0; c < 2; c++)
+            m->timer_compare[2 * n + c] = m->timer_buffer[2 * n + c];
+}
+
 static void pass_milestone(struct avr *m, u32 n, const struct milestone *next, u64 at)
 {
     u32 flags = next->flags & ~(m->timer_blocked[n] && next->ticks == 1 ? (u32)(COMPARE_A | COMPARE_B) : 0);
     u32 rising = flags & ~m->data[TIFR0 + n];
     m->data[TIFR0 + n] |= (u8)flags;
-    m->timer_position[n] = next->wraps ? 0 : m->timer_position[n] + (u32)next->ticks;
-    if (next->updates)
-        for (u32 c = 0; c < 2; c++)
-            m->timer_compare[2 * n + c] = m->timer_buffer[2 * n + c];
+    move_to(m, n, next);
     if (n == 0 && rising & COMPARE_A)
         start_conversion_by(m, 3, at);
     if (n == 0 && rising & OVERFLOW)
@@ -125,8 +141,9 @@ static void count_ticks(struct avr *m, u32 n, u64 ticks, u64 first, int shift)
     u64 done = 0;
     while (ticks) {
         struct waveform w = waveform_of(m, n);
-        u64 period = w.kind < PHASE_PWM ? (u64)w.top + 1 : 2 * (u64)(w.top ? w.top : 1);
-        int settled = m->timer_position[n] < period && m->timer_compare[2 * n] == m->timer_buffer[2 * n] &&
+        u64 period = w.kind < PHASE_PWM ? (u64)w.top + 1 : 2 * (u64)turn_of(m, n, &w);
+        int same_top = w.kind < PHASE_PWM || turn_of(m, n, &w) == w.top;
+        int settled = same_top && m->timer_position[n] < period && m->timer_compare[2 * n] == m->timer_buffer[2 * n] &&
                       m->timer_compare[2 * n + 1] == m->timer_buffer[2 * n + 1];
         if (settled && ticks > 3 * period) { // the last two periods set all flags
             u64 whole = (ticks - 2 * period) / period * period;
@@ -178,7 +195,7 @@ static void timer_schedule(struct avr *m, u32 n)
     if (shift < 0 || !wanted || m->sleep_from != NEVER)
         return;
     u32 position = m->timer_position[n], blocked = m->timer_blocked[n];
-    u16 compare[2] = {m->timer_compare[2 * n], m->timer_compare[2 * n + 1]};
+    u16 turn = m->timer_turn[n], compare[2] = {m->timer_compare[2 * n], m->timer_compare[2 * n + 1]};
     u64 ticks = 0;
     for (int tries = 0; tries < 16; tries++) {
         struct waveform w = waveform_of(m, n);
@@ -191,12 +208,10 @@ static void timer_schedule(struct avr *m, u32 n)
             break;
         }
         m->timer_blocked[n] = 0;
-        m->timer_position[n] = next.wraps ? 0 : m->timer_position[n] + (u32)next.ticks;
-        if (next.updates)
-            for (u32 c = 0; c < 2; c++)
-                m->timer_compare[2 * n + c] = m->timer_buffer[2 * n + c];
+        move_to(m, n, &next);
     }
     m->timer_position[n] = position, m->timer_blocked[n] = (u8)blocked; // the search changes nothing
+    m->timer_turn[n] = turn;
     m->timer_compare[2 * n] = compare[0], m->timer_compare[2 * n + 1] = compare[1];
 }
 
@@ -215,13 +230,13 @@ static void timers_schedule(struct avr *m)
 static u32 timer_count(const struct avr *m, u32 n)
 {
     struct waveform w = waveform_of(m, n);
-    u32 position = m->timer_position[n], top = w.top ? w.top : 1;
-    return w.kind < PHASE_PWM || position <= top ? position : 2 * top - position;
+    u32 position = m->timer_position[n], turn = turn_of(m, n, &w);
+    return w.kind < PHASE_PWM || position <= turn ? position : 2 * turn - position;
 }
 
 static void set_count(struct avr *m, u32 n, u32 value)
 {
-    m->timer_position[n] = value;
+    m->timer_position[n] = value, m->timer_turn[n] = 0;
     m->timer_blocked[n] = 1;
 }
 
@@ -241,7 +256,7 @@ static void set_control(struct avr *m, u32 n, u32 address, u32 value)
     m->data[address] = (u8)value;
     struct waveform after = waveform_of(m, n);
     if (before.kind < PHASE_PWM || after.kind < PHASE_PWM || before.top != after.top)
-        m->timer_position[n] = count; // an up-down timer with the same top keeps its position
+        m->timer_position[n] = count, m->timer_turn[n] = 0; // an up-down timer with the same top keeps its position
     if (waveform_of(m, n).kind < FAST_PWM)
         for (u32 c = 0; c < 2; c++)
             m->timer_compare[2 * n + c] = m->timer_buffer[2 * n + c];
@@ -283,6 +298,14 @@ static u32 timer_read(struct avr *m, u32 address)
     default:
         return m->data[address];
     }
+}
+
+// A dual-slope timer whose count is at TOP or above it counts down.
+static void turn_at_top(struct avr *m, u32 n)
+{
+    struct waveform w = waveform_of(m, n);
+    if (w.kind >= PHASE_PWM && !m->timer_turn[n] && m->timer_position[n] >= turn_of(m, n, &w))
+        m->timer_turn[n] = (u16)m->timer_position[n];
 }
 
 static void timer_write(struct avr *m, u32 address, u32 value)

@@ -59,6 +59,18 @@ def test_phase_correct_pwm_has_510_ticks(machine: Machine) -> None:
     assert m.state.timer_compare[4] == 100
 
 
+def test_a_new_top_takes_effect_while_the_timer_turns(machine: Machine) -> None:
+    """A timer whose TOP falls from 200 to 20 at its peak counts down from 200; its next period has 40 ticks."""
+    m = machine("""
+        volatile uint8_t n;
+        ISR(TIMER0_OVF_vect) { PORTB = ++n; if (n == 2) OCR0A = 20; }
+        int main(void) { OCR0A = 200; TCCR0A = 1; TCCR0B = 0x0A; TIMSK0 = 1; sei(); for (;;) ; }""")
+    m.watch([PORTB])
+    m.run_until(20_000)
+    periods = [round((b.cycle - a.cycle) / 8) for a, b in pairwise(m.changes)]
+    assert periods[:4] == [400, 400, 40, 40]
+
+
 def test_sixteen_bits_in_two_halves(machine: Machine) -> None:
     """The high byte of timer 1 is latched with the low one, and written before it."""
     m = run(machine, """
