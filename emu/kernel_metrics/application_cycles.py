@@ -252,7 +252,7 @@ class _Run:
             self._heap_begin = self._kernel.memory_end - Heap(self._machine).capacity
         name = self._kernel.function_name(self._machine.w[ENTRY_REGISTER])
         self._names[pcb, self._kernel.pid(self._machine, pcb)] = name
-        self._ready.pop(pcb, None)  # of an earlier thread at the same address
+        self._ready.pop(pcb, None)  # entry of an earlier thread at the same address
         self._thread_runs(self._machine.cycle)
 
     def _yields(self) -> None:

@@ -9,7 +9,7 @@
 
 enum {
     HAL_UPDATE_ROW = 96,  /* bytes */
-    HAL_UPDATE_ROWS = 32, /* of a program; a store has one more, the first */
+    HAL_UPDATE_ROWS = 32, /* rows of a program; a store has one more, its head */
     HAL_UPDATE_STORES = 2,
     HAL_UPDATE_RUN = HAL_UPDATE_STORES /* number of the third slot */
 };

@@ -15,6 +15,6 @@ typedef struct {
     uint8_t uart[UART_ROOM];
 } machine;
 
-int machine_step(machine *m); /* one instruction, or a stretch of sleep; RUNS_ON, DONE or CRASHED */
+int machine_step(machine *m); /* executes one instruction, or sleeps; returns RUNS_ON, DONE or CRASHED */
 
 #endif

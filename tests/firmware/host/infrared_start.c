@@ -130,8 +130,8 @@ TEST(a_quota_does_not_hold_back_what_is_shared, "openswarm_remote.h, Sys_Share_E
     CHECK(Sys_Keep_Latest(&latest, ALARM));
     Sys_Start_CriticalSection();
     for (int i = 0; i < SYS_INFRARED_QUEUE / 2; i++) {
-        receive_alarm(i, 'x');                 /* replaces what waits */
-        CHECK(Sys_Send_Event(ALARM, "x", 1)); /* as this does, with equal contents */
+        receive_alarm(i, 'x');                 /* replaces the waiting message */
+        CHECK(Sys_Send_Event(ALARM, "x", 1)); /* replaces the waiting message, too */
     }
     Sys_End_CriticalSection();
     Sys_Yield();

@@ -88,12 +88,12 @@ static const sys_scheduler *const schedulers[] = {&sys_round_robin, &sys_woken_f
 
 typedef struct {
     uint8 kind, number, index;
-    sys_event_data *data; /* of a handler or condition */
+    sys_event_data *data; /* argument of a handler or condition */
 } place;
 
 static void put(const place *at, uint8 code, uint16 result, uint16 extra)
 {
-    (void)Sys_Get_SystemTime(); /* it unlocks: an interrupt may come here, before anything is recorded */
+    (void)Sys_Get_SystemTime(); /* the call unlocks, so an interrupt may occur here, before the record is made */
     uint16 heap = at->kind == KIND_ISR ? 0 : Sys_Get_Statistics()->heap_used;
     record r = {at->number, at->kind, at->index, code, Sys_Get_ProcessID(), result, Sys_Get_LastError(), heap, clock_now(),
                 extra};

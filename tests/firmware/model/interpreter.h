@@ -7,8 +7,8 @@
 #include "openswarm.h"
 
 enum {
-    MOST_RECORDS = 300, /* a run ends then, */
-    MOST_IDLES = 50,    /* or when the kernel has idled so often */
+    MOST_RECORDS = 300, /* a run ends after so many records, */
+    MOST_IDLES = 50,    /* or after the kernel has idled so often */
     MOST_STARTS = 40,   /* later starts of threads are skipped */
     MOST_PIDS = 256,
     SIZES = 15

@@ -89,7 +89,7 @@ static HAL_OUTLINE void empty(uint8 uart)
     }
 }
 
-/* All four interrupts; one that comes meanwhile is served in the same round. */
+/* Common handler of the four UART interrupts; a flag that is set meanwhile is served in the same call. */
 HAL_USED void uart_isr(void)
 {
     if (IFS0bits.U1RXIF) {

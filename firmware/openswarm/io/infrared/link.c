@@ -33,7 +33,7 @@ enum {
     FOLLOW_EVERY = 4,       /* scans */
     HOUSEKEEPING = 64,
     MULTIPLIER = 25173,
-    INCREMENT = 13849 /* of a full period of 2^16 */
+    INCREMENT = 13849 /* with MULTIPLIER: a period of 2^16 */
 };
 
 static enum { LISTEN, ONES, BITS, SEND, FLASHING, SETTLING, RESTING } state;

@@ -215,7 +215,7 @@ static sys_error share(uint16 id, uint8 hops)
             return SYS_ERROR_MEMORY;
         }
         if (s->hops != 0) {
-            remove_gate(s->event); /* of an event that was unregistered */
+            remove_gate(s->event); /* the gate of an unregistered event */
         }
         s->hops = 0;
         hal_barrier();

@@ -5,7 +5,7 @@
 
 #include "openswarm.h"
 
-enum { SYS_SPI_TIMEOUT_MS = 100 /* of one transfer: 65,535 bytes would take longer than any board's heap holds */ };
+enum { SYS_SPI_TIMEOUT_MS = 100 /* of one transfer; no board's heap holds a transfer that takes longer */ };
 
 /* Receives the bytes of a transfer twice and may change them: first those to send, then those received. False: the
  * bytes are not sent, or those received are damaged; the transfer fails. Context: the thread that calls

@@ -10,7 +10,7 @@ typedef void *hal_limit;
 bool host_allocation_fails(void);
 #define HAL_ALLOCATION_FAILS() host_allocation_fails()
 #define HAL_STACK_IS_TAKEN
-#define HAL_WORD_IS_ONE_ACT 1 /* and "interrupts" come between C statements only */
+#define HAL_WORD_IS_ONE_ACT 1 /* "interrupts" occur between C statements only */
 
 hal_lock_state hal_lock_slice(void);
 hal_lock_state hal_lock_devices(void);

@@ -90,7 +90,7 @@ __attribute__((used)) void boundaries_isr(void)
     MUST(!Sys_Send_IntEvent(NEVER, 1));
     (void)Sys_Send_IntEvent(SHARED, 1); /* the event may be registered at this moment */
     (void)Sys_Send_IntEvent(WAITED, 2); /* a value that the waiter's condition rejects */
-    Sys_End_CriticalSection(); /* of no effect here, as is the next one */
+    Sys_End_CriticalSection(); /* no effect in an ISR, like the next call */
     Sys_Start_CriticalSection();
     Sys_Start_CriticalSection();
     (void)Sys_Get_ProcessID();

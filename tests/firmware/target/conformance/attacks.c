@@ -155,7 +155,7 @@ static void sections_without_their_other_half(void)
     CHECK(start(once, NULL, 0) != 0);
     Sys_Start_CriticalSection();
     Sys_Yield();
-    CHECK(noted("ii")); /* one section excludes the other thread all the same */
+    CHECK(noted("ii")); /* a single section is enough to exclude the other thread */
     Sys_End_CriticalSection();
     Sys_Yield();
     CHECK(noted("iio"));

@@ -123,7 +123,7 @@ static void only_its_bits_wake_a_thread(void)
     Sys_Sleep(12);
     Sys_Start_CriticalSection();
     Sys_Notify(&notice, BIT_A);
-    CHECK(Sys_Kill_Process(pid)); /* it has not taken the bit */
+    CHECK(Sys_Kill_Process(pid)); /* the thread has not taken the bit */
     Sys_End_CriticalSection();
     CHECK(Sys_Wait_for_Notification(&notice, BIT_A, 1) == BIT_A && heap_now() == heap);
 }

@@ -128,7 +128,7 @@ static void take(uint16 size, bool is_hole)
 {
     uint16 *at = heap_alloc(size);
     expect(at != NULL);
-    at[size / 2 - 1] = NEAR; /* as if a hole ended here: heap_free must search for it in vain */
+    at[size / 2 - 1] = NEAR; /* looks like the end of a hole, so heap_free must search the tree without success */
     taken[pieces].at = at;
     taken[pieces].size = size;
     taken[pieces++].is_hole = is_hole;
