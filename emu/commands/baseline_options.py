@@ -12,13 +12,13 @@ from typing import Any, Final
 from emu.host.command import CommandError
 from emu.host.exit_status import DONE, FAULT
 from emu.kernel_metrics import baseline
-from emu.kernel_metrics.baseline import Baseline, Number, Row
+from emu.kernel_metrics.baseline import Baseline, Metric, MetricRow
 from emu.kernel_metrics.check_report import CheckReport
 
 CONDITIONS: Final = ("seconds", "board", "crystal", "selector", "camera", "sensor", "stimulus", "function", "interval")
 """Options that change the measured numbers. A baseline stores those that differ from their default."""
 
-Blame = Callable[[Row, Baseline], list[tuple[str, int]]]
+Blame = Callable[[MetricRow, Baseline], list[tuple[str, int]]]
 """blame(row, baseline) returns (source line, amount) of a row that failed."""
 
 
@@ -93,7 +93,7 @@ class BaselineCommand:
 
     def finish(
         self,
-        numbers: Mapping[str, Number],
+        numbers: Mapping[str, Metric],
         facts: dict[str, Any],
         text: Callable[[], str],
         blame: Blame,

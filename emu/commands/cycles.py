@@ -19,7 +19,7 @@ from emu.host.exit_status import FAULT
 from emu.image.loader import load_image
 from emu.image.model import Image
 from emu.kernel_metrics.application_cycles import ApplicationCycles, measure
-from emu.kernel_metrics.baseline import Baseline, Number, Row
+from emu.kernel_metrics.baseline import Baseline, Metric, MetricRow
 from emu.kernel_metrics.blame import CodeListing, grown_lines
 from emu.kernel_metrics.suite import latency
 from emu.kernel_metrics.suite import options as kernel_options
@@ -130,18 +130,18 @@ def _place(image: Image, text: str) -> int:
     return min(starts)
 
 
-def _numbers(result: ApplicationCycles, listing: CodeListing) -> dict[str, Number]:
+def _numbers(result: ApplicationCycles, listing: CodeListing) -> dict[str, Metric]:
     """Return the numbers of a baseline: those of undisturbed occurrences, else the least of all."""
     numbers = {}
     for name, operation in result.operations.items():
         statistics = operation.statistics()
         if not operation.undisturbed:
-            numbers[f"{name}, min"] = Number(statistics["min"], "cycles", is_gated=False)
+            numbers[f"{name}, min"] = Metric(statistics["min"], "cycles", is_gated=False)
             continue
         places = {"min": operation.shortest, "median": operation.shortest, "max": operation.longest}
         for key in GATED:
-            where = listing.where(places[key])
-            numbers[f"{name}, {key}"] = Number(statistics[f"undisturbed_{key}"], "cycles", where=where)
+            where = listing.by_instruction(places[key])
+            numbers[f"{name}, {key}"] = Metric(statistics[f"undisturbed_{key}"], "cycles", where=where)
     return numbers
 
 
@@ -167,18 +167,20 @@ def _suite(image: Image, options: argparse.Namespace) -> int:
     except (MeasureError, ValueError) as error:
         raise CommandError(str(error)) from None
     listing = CodeListing(image)
-    numbers = {name: Number(one.cycles, "cycles", where=listing.where(one.where)) for name, one in windows.items()}
+    numbers = {
+        name: Metric(one.cycles, "cycles", where=listing.by_instruction(one.where)) for name, one in windows.items()
+    }
     width = max(len(name) for name in numbers)
     text = "\n".join(f"{name:{width}} {number.value:8,} cycles" for name, number in numbers.items())
     return _finish(command, image, numbers, {name: number.value for name, number in numbers.items()}, text)
 
 
 def _finish(
-    command: BaselineCommand, image: Image, numbers: Mapping[str, Number], facts: dict[str, Any], text: str
+    command: BaselineCommand, image: Image, numbers: Mapping[str, Metric], facts: dict[str, Any], text: str
 ) -> int:
     listing = CodeListing(image)
 
-    def blame(row: Row, stored: Baseline) -> list[tuple[str, int]]:
+    def blame(row: MetricRow, stored: Baseline) -> list[tuple[str, int]]:
         if row.name not in stored.rows:
             return []
         return grown_lines(stored.rows[row.name].where, stored.code, numbers[row.name].where, listing)

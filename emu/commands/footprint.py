@@ -23,7 +23,7 @@ from emu.image.footprint import UNKNOWN, Piece, pieces, totals
 from emu.image.loader import load_image
 from emu.image.model import BYTES_PER_WORD, Image
 from emu.kernel_metrics.application_memory import ApplicationMemory, engine_for, measure
-from emu.kernel_metrics.baseline import Baseline, Number, Row
+from emu.kernel_metrics.baseline import Baseline, Metric, MetricRow
 from emu.kernel_metrics.blame import LINES_SHOWN, short
 from emu.kernel_metrics.footprint_rows import grown_pieces, line_of, run_numbers, static_numbers
 from emu.kernel_metrics.kernel_structures import KernelStructures
@@ -76,14 +76,14 @@ def run(options: argparse.Namespace) -> int:
     if equation is not None:
         facts["equation"] = equation
         text.append(partial(equation_text, equation))
-        numbers |= {f"{name} of the memory equation": Number(ceil(equation[name])) for name in "ABCDE"}
+        numbers |= {f"{name} of the memory equation": Metric(ceil(equation[name])) for name in "ABCDE"}
         for owner, words in (("kernel", "of the kernel alone"), ("devices", "of kernel and devices")):
-            numbers |= {f"{key} {words}": Number(equation["sizes"][owner][name]) for key, name in _SIZES}
+            numbers |= {f"{key} {words}": Metric(equation["sizes"][owner][name]) for key, name in _SIZES}
     option_sizes = _options(image)
     if option_sizes is not None:
         facts["options"] = option_sizes
         text.append(partial(_options_text, option_sizes))
-        numbers = {name: Number(size) for name, size in option_sizes.items()}
+        numbers = {name: Metric(size) for name, size in option_sizes.items()}
     use = _run(image, options) if has_kernel else None
     fault = use.stop.fault if use is not None and use.stop is not None else None
     if use is not None:
@@ -129,7 +129,7 @@ def _run(image: Image, options: argparse.Namespace) -> ApplicationMemory:
 
 
 def _blame(
-    image: Image, numbers: Mapping[str, Number], use: ApplicationMemory | None, row: Row, stored: Baseline
+    image: Image, numbers: Mapping[str, Metric], use: ApplicationMemory | None, row: MetricRow, stored: Baseline
 ) -> list[tuple[str, int]]:
     """Return the symbols that grew with the lines that declare them, or the line that uses a thread or an event."""
     old = {file: dict(parts) for file, parts in stored.rows[row.name].where.items()} if row.name in stored.rows else {}

@@ -28,7 +28,7 @@ Where = Mapping[str, Mapping[str, int]]
 
 
 @dataclass(frozen=True, slots=True)
-class Number:
+class Metric:
     """A measured value. `of` is the whole that a limit in percent refers to."""
 
     value: int
@@ -62,7 +62,7 @@ class Baseline:
 
 
 @dataclass(frozen=True, slots=True)
-class Row:
+class MetricRow:
     """Comparison of one number. `old` is None for a new number, `new` for a number that is no longer measured."""
 
     name: str
@@ -84,7 +84,7 @@ class Row:
         return None if self.old is None or self.new is None else self.new - self.old
 
 
-def save(path: str, baseline: Baseline, numbers: Mapping[str, Number]) -> None:
+def save(path: str, baseline: Baseline, numbers: Mapping[str, Metric]) -> None:
     """Write a baseline atomically. `baseline.rows` holds the limits to keep, by row."""
     rows = {}
     for name, number in numbers.items():
@@ -162,21 +162,23 @@ def _code(path: str, code: dict[str, Any]) -> dict[str, tuple[str, ...]]:
     return {name: tuple(lines) for name, lines in code.items()}
 
 
-def compare(old: Mapping[str, StoredRow], new: Mapping[str, Number]) -> list[Row]:
+def compare(old: Mapping[str, StoredRow], new: Mapping[str, Metric]) -> list[MetricRow]:
     """Return one row per name: first in the order of `new`, then the names that are only in `old`."""
     rows = []
     for name, number in new.items():
         stored = old.get(name)
         if stored is None:
             verdict = "missing in the baseline" if number.is_gated else "same"
-            rows.append(Row(name, number.unit, None, number.value, verdict))
+            rows.append(MetricRow(name, number.unit, None, number.value, verdict))
         else:
-            rows.append(Row(name, number.unit, stored.value, number.value, _verdict(stored, number), stored.limit))
+            rows.append(
+                MetricRow(name, number.unit, stored.value, number.value, _verdict(stored, number), stored.limit)
+            )
     gone = [name for name, row in old.items() if name not in new and (row.is_gated or row.limit)]
-    return rows + [Row(name, "", old[name].value, None, "no longer measured", old[name].limit) for name in gone]
+    return rows + [MetricRow(name, "", old[name].value, None, "no longer measured", old[name].limit) for name in gone]
 
 
-def _verdict(stored: StoredRow, number: Number) -> str:
+def _verdict(stored: StoredRow, number: Metric) -> str:
     gain = (number.value - stored.value) * (1 if number.more_is_better else -1)
     if stored.limit:
         return ("better" if gain > 0 else "same") if _within(stored.limit, number) else "over its limit"
@@ -185,7 +187,7 @@ def _verdict(stored: StoredRow, number: Number) -> str:
     return "better" if gain > 0 else "same"
 
 
-def _within(limit: str, number: Number) -> bool:
+def _within(limit: str, number: Metric) -> bool:
     """Whether a number keeps a limit of the form that `load` has checked."""
     found = _LIMIT.fullmatch(limit)
     assert found is not None

@@ -83,7 +83,7 @@ class CodeListing:
         symbols = self._image.symbols
         return sorted({s.address for s in symbols.all if s.space == "code" and s.names_content})
 
-    def where(self, addresses: Mapping[int, int]) -> dict[str, dict[str, int]]:
+    def by_instruction(self, addresses: Mapping[int, int]) -> dict[str, dict[str, int]]:
         """Convert cycles by instruction address to cycles by function and instruction index."""
         found: dict[str, dict[str, int]] = {}
         for address, cycles in sorted(addresses.items()):

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
-from emu.kernel_metrics.baseline import Row
+from emu.kernel_metrics.baseline import MetricRow
 
 NAMES_SHOWN: Final = 3
 """Maximum number of rows that the verdict line names."""
@@ -21,7 +21,7 @@ class CheckReport:
 
     command: str
     path: str
-    rows: list[Row]
+    rows: list[MetricRow]
     blame: Mapping[str, list[tuple[str, int]]]
     accept: str
     """Command line that writes the new numbers."""
@@ -45,7 +45,7 @@ class CheckReport:
             f" To accept the new numbers: {self.accept}"
         )
 
-    def _shown(self) -> list[Row]:
+    def _shown(self) -> list[MetricRow]:
         """Return the rows that changed: those that fail, the largest growth first, then those that are better."""
         bad = [row for row in self.rows if row.fails]
         bad.sort(key=lambda row: (row.difference is None, -abs(row.difference or 0)))

@@ -1,6 +1,6 @@
 """Rows of a footprint baseline: every number of `emu footprint` that a check compares.
 
-Input: the pieces of an image and the memory use of a run. Output: `Number`s by name. A row of a single file or of free
+Input: the pieces of an image and the memory use of a run. Output: `Metric`s by name. A row of a single file or of free
 memory is only compared if the baseline gives it a limit.
 """
 
@@ -12,14 +12,14 @@ from collections.abc import Sequence
 from emu.image.footprint import Piece, group
 from emu.image.model import Image
 from emu.kernel_metrics.application_memory import ApplicationMemory
-from emu.kernel_metrics.baseline import Number
+from emu.kernel_metrics.baseline import Metric
 from emu.kernel_metrics.blame import short
 from emu.kernel_metrics.owners import sizes_by_owner
 
 
-def static_numbers(image: Image, found: Sequence[Piece]) -> dict[str, Number]:
+def static_numbers(image: Image, found: Sequence[Piece]) -> dict[str, Metric]:
     """Return the sizes of an image: in all, without start-up code, by owner, by source file."""
-    numbers: dict[str, Number] = {}
+    numbers: dict[str, Metric] = {}
     for kind in ("rom", "ram"):
         name = kind.upper()
         where: dict[str, dict[str, int]] = defaultdict(dict)
@@ -29,49 +29,49 @@ def static_numbers(image: Image, found: Sequence[Piece]) -> dict[str, Number]:
                 parts = where[short(piece.module)]
                 parts[piece.name] = parts.get(piece.name, 0) + size
         files = {file: sum(parts.values()) for file, parts in where.items()}
-        numbers[name] = Number(sum(files.values()), where=where)
+        numbers[name] = Metric(sum(files.values()), where=where)
         left = sum(getattr(piece, kind) for piece in found if group(piece) == "program")
-        numbers[f"{name} without vectors, start-up code and printf"] = Number(left, where=where)
-        numbers |= {f"{file}: {name}": Number(size, is_gated=False) for file, size in sorted(files.items())}
+        numbers[f"{name} without vectors, start-up code and printf"] = Metric(left, where=where)
+        numbers |= {f"{file}: {name}": Metric(size, is_gated=False) for file, size in sorted(files.items())}
     for owner, sizes in sizes_by_owner(image).items():
-        numbers |= {f"{owner}: ROM": Number(sizes.rom), f"{owner}: RAM": Number(sizes.ram)}
+        numbers |= {f"{owner}: ROM": Metric(sizes.rom), f"{owner}: RAM": Metric(sizes.ram)}
     return numbers
 
 
-def run_numbers(memory: ApplicationMemory) -> dict[str, Number]:
+def run_numbers(memory: ApplicationMemory) -> dict[str, Metric]:
     """Return the numbers of a run: threads, events, heap, kernel stack."""
-    numbers: dict[str, Number] = {"threads at once": Number(memory.most_threads, "threads")}
+    numbers: dict[str, Metric] = {"threads at once": Metric(memory.most_threads, "threads")}
     for thread in memory.threads:
         name = f"thread {thread.name}"
         has_block = thread.heap > 0  # the stack of main is the rest of RAM, which grows when variables shrink
         numbers |= {
-            f"{name}: stack": Number(thread.stack, is_gated=has_block),
-            f"{name}: stack used": Number(thread.used, of=thread.stack),
-            f"{name}: stack free": Number(thread.free, of=thread.stack, more_is_better=True, is_gated=False),
-            f"{name}: heap block": Number(thread.heap),
-            f"{name}: cleanup nodes": Number(thread.cleanups, "nodes"),
-            f"{name}: mutexes owned": Number(thread.mutexes, "mutexes"),
+            f"{name}: stack": Metric(thread.stack, is_gated=has_block),
+            f"{name}: stack used": Metric(thread.used, of=thread.stack),
+            f"{name}: stack free": Metric(thread.free, of=thread.stack, more_is_better=True, is_gated=False),
+            f"{name}: heap block": Metric(thread.heap),
+            f"{name}: cleanup nodes": Metric(thread.cleanups, "nodes"),
+            f"{name}: mutexes owned": Metric(thread.mutexes, "mutexes"),
         }
     numbers |= {
-        "events": Number(len(memory.events), "events"),
-        "subscriptions": Number(sum(event.subscriptions for event in memory.events), "subscriptions"),
+        "events": Metric(len(memory.events), "events"),
+        "subscriptions": Metric(sum(event.subscriptions for event in memory.events), "subscriptions"),
     }
     for event in memory.events:
         numbers |= {
-            f"{event.name}: subscriptions": Number(event.subscriptions, "subscriptions"),
-            f"{event.name}: queued messages": Number(event.peak_messages, "messages"),
-            f"{event.name}: queued bytes": Number(event.peak_bytes),
+            f"{event.name}: subscriptions": Metric(event.subscriptions, "subscriptions"),
+            f"{event.name}: queued messages": Metric(event.peak_messages, "messages"),
+            f"{event.name}: queued bytes": Metric(event.peak_bytes),
         }
     heap = memory.heap
     return numbers | {
-        "heap: peak": Number(heap.peak, of=heap.capacity),
-        "heap: used at the end": Number(heap.used, of=heap.capacity),
-        "heap: free at the end": Number(heap.free, of=heap.capacity, more_is_better=True, is_gated=False),
-        "heap: largest free block": Number(heap.largest_free, of=heap.capacity, more_is_better=True, is_gated=False),
-        "heap: messages at the end": Number(heap.messages),
-        "heap: drivers, peak": Number(heap.drivers_peak),
-        "kernel stack: used": Number(memory.kernel_stack_used, of=memory.kernel_stack),
-        "A of the memory equation": Number(memory.equation["A"]),
+        "heap: peak": Metric(heap.peak, of=heap.capacity),
+        "heap: used at the end": Metric(heap.used, of=heap.capacity),
+        "heap: free at the end": Metric(heap.free, of=heap.capacity, more_is_better=True, is_gated=False),
+        "heap: largest free block": Metric(heap.largest_free, of=heap.capacity, more_is_better=True, is_gated=False),
+        "heap: messages at the end": Metric(heap.messages),
+        "heap: drivers, peak": Metric(heap.drivers_peak),
+        "kernel stack: used": Metric(memory.kernel_stack_used, of=memory.kernel_stack),
+        "A of the memory equation": Metric(memory.equation["A"]),
     }
 
 

@@ -6,7 +6,7 @@ import json
 
 import pytest
 
-from emu.kernel_metrics.baseline import Baseline, Number, StoredRow, compare, load, save
+from emu.kernel_metrics.baseline import Baseline, Metric, StoredRow, compare, load, save
 from emu.kernel_metrics.blame import aligned, normalised, short, without_comments
 from emu.kernel_metrics.check_report import CheckReport
 
@@ -24,7 +24,7 @@ def report(old, new, blame=None):
 
 
 def test_a_baseline_comes_back_as_it_was_written(tmp_path):
-    numbers = {"yield": Number(61, "cycles", where={"_f": {"0": 4}}), "free": Number(3, of=10, is_gated=False)}
+    numbers = {"yield": Metric(61, "cycles", where={"_f": {"0": 4}}), "free": Metric(3, of=10, is_gated=False)}
     path = written(tmp_path, numbers, Baseline("emu cycles", {"seconds": "0.5"}, {}, {"_f": ("nop", "return")}))
     found = load(str(path))
     assert found.rows == {"yield": StoredRow(61, {"_f": {"0": 4}}), "free": StoredRow(3, is_gated=False)}
@@ -35,7 +35,7 @@ def test_a_baseline_comes_back_as_it_was_written(tmp_path):
 
 def test_an_update_keeps_the_limits_of_the_file(tmp_path):
     old = Baseline("emu footprint", {}, {"RAM": StoredRow(5, limit="at most 9")})
-    assert load(str(written(tmp_path, {"RAM": Number(6)}, old))).rows["RAM"] == StoredRow(6, limit="at most 9")
+    assert load(str(written(tmp_path, {"RAM": Metric(6)}, old))).rows["RAM"] == StoredRow(6, limit="at most 9")
 
 
 @pytest.mark.parametrize(
@@ -57,7 +57,7 @@ def test_an_update_keeps_the_limits_of_the_file(tmp_path):
     ],
 )  # fmt: skip
 def test_an_unreadable_key_is_refused_with_its_name(tmp_path, change, message):
-    path = written(tmp_path, {"RAM": Number(5)})
+    path = written(tmp_path, {"RAM": Metric(5)})
     table = json.loads(path.read_text())
     change(table)
     path.write_text(json.dumps(table))
@@ -76,19 +76,19 @@ def test_anything_else_is_refused(tmp_path, text):
 
 def test_growth_and_rows_without_a_partner_fail():
     old = {name: StoredRow(10) for name in ("grew", "fell", "same", "gone")}
-    new = {"grew": Number(11), "fell": Number(9), "same": Number(10), "new": Number(5)}
+    new = {"grew": Metric(11), "fell": Metric(9), "same": Metric(10), "new": Metric(5)}
     assert {row.name: row.verdict for row in compare(old, new) if row.fails} == {
         "grew": "worse", "new": "missing in the baseline", "gone": "no longer measured",
     }  # fmt: skip
 
 
 def test_of_free_memory_less_is_worse():
-    assert compare({"free": StoredRow(10)}, {"free": Number(9, more_is_better=True)})[0].verdict == "worse"
-    assert compare({"free": StoredRow(10)}, {"free": Number(11, more_is_better=True)})[0].verdict == "better"
+    assert compare({"free": StoredRow(10)}, {"free": Metric(9, more_is_better=True)})[0].verdict == "worse"
+    assert compare({"free": StoredRow(10)}, {"free": Metric(11, more_is_better=True)})[0].verdict == "better"
 
 
 def test_a_row_that_is_not_gated_fails_only_over_its_limit():
-    old, new = {"file": StoredRow(10, is_gated=False)}, {"file": Number(99, is_gated=False)}
+    old, new = {"file": StoredRow(10, is_gated=False)}, {"file": Metric(99, is_gated=False)}
     assert not any(row.fails for row in compare(old, new) + compare({}, new) + compare(old, {}))
     limited = {"file": StoredRow(10, limit="at most 98", is_gated=False)}
     assert [row.verdict for row in compare(limited, new) + compare(limited, {})] == [
@@ -104,23 +104,23 @@ def test_a_row_that_is_not_gated_fails_only_over_its_limit():
     ],
 )  # fmt: skip
 def test_a_limit_replaces_the_rule_against_growth(limit, value, fails):
-    assert compare({"x": StoredRow(10, limit=limit)}, {"x": Number(value, of=100)})[0].fails == fails
+    assert compare({"x": StoredRow(10, limit=limit)}, {"x": Metric(value, of=100)})[0].fails == fails
 
 
 def test_every_check_ends_with_one_verdict_line():
-    failed = report({"a": StoredRow(1), "b": StoredRow(1)}, {"a": Number(3), "b": Number(2)})
+    failed = report({"a": StoredRow(1), "b": StoredRow(1)}, {"a": Metric(3), "b": Metric(2)})
     assert failed.text().splitlines()[-1] == (
         "emu footprint: FAIL: 2 of 2 rows against b.json: a; b."
         " To accept the new numbers: emu footprint f.elf --update b.json"
     )
-    passed = report({"a": StoredRow(1)}, {"a": Number(1)})
+    passed = report({"a": StoredRow(1)}, {"a": Metric(1)})
     assert passed.text() == "emu footprint: PASS: none of 1 rows is worse than in b.json"
-    better = report({"a": StoredRow(2)}, {"a": Number(1)})
+    better = report({"a": StoredRow(2)}, {"a": Metric(1)})
     assert better.text().endswith(", 1 better; keep them with: emu footprint f.elf --update b.json")
 
 
 def test_reports_hold_baseline_measurement_difference_and_lines():
-    made = report({"send": StoredRow(10)}, {"send": Number(15, "cycles")}, {"send": [("a.c:3: x | y;", 5)]})
+    made = report({"send": StoredRow(10)}, {"send": Metric(15, "cycles")}, {"send": [("a.c:3: x | y;", 5)]})
     assert "+5 cycles  WORSE" in made.text()
     assert "+5 a.c:3: x | y;" in made.text()
     assert "| send | 10 | 15 | +5 cycles | worse | +5 `a.c:3: x \\| y;` |" in made.markdown()
