@@ -1,0 +1,1 @@
+"""The kernel's own suite of measurements: applications `latency`, `options` and `footprint`."""
