@@ -44,6 +44,7 @@ static int sleep_on(struct avr *m)
     u64 from = m->cycle;
     if (m->data[SREG_AT] & FLAG_I && pending_vectors(m) & waking_vectors(m)) {
         wake_up(m);
+        find_next_due(m);
         return 1;
     }
     if (!can_continue(m)) {

@@ -241,6 +241,7 @@ static inline u16 word_difference(u8 *s, u32 a, u32 b)
     do { \
         SAVE(); \
         fall_asleep(m, cycle + 1); \
+        find_next_due(m); \
         RESUME(); \
     } while (0)
 #define RESET_WATCHDOG() \

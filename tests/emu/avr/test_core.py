@@ -94,6 +94,23 @@ def test_power_down_stops_the_timers(machine: Machine) -> None:
     assert 0 < m.peek("after", 2) - m.peek("before", 2) < 100
 
 
+def test_power_down_suspends_a_timer_interrupt(machine: Machine) -> None:
+    """An interrupt of timer 0 that was due during power-down comes after it, later by the time of the sleep."""
+    m = machine("""
+        ISR(WDT_vect) { }
+        ISR(TIMER0_COMPA_vect) { PORTB = 1; }
+        int main(void) {
+            OCR0A = 99; TCCR0B = 5; TIMSK0 = 2; WDTCSR = 1 << WDCE | 1 << WDE; WDTCSR = 1 << WDIE;
+            set_sleep_mode(SLEEP_MODE_PWR_DOWN); sei(); sleep_mode();
+            WDTCSR = 1 << WDCE | 1 << WDE; WDTCSR = 0;
+            for (;;) ;
+        }""")
+    m.watch([0x25])
+    m.run_until(1_000_000)
+    assert m.state.slept > 127_000
+    assert [0 <= change.cycle - m.state.slept - 100 * 1024 < 100 for change in m.changes] == [True]
+
+
 def test_sleep_without_interrupts_halts(machine: Machine) -> None:
     """With interrupts off nothing wakes the CPU: the run ends where it sleeps."""
     m = machine("int main(void) { cli(); sleep_mode(); PORTB = 1; for (;;) ; }")
