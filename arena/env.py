@@ -25,6 +25,7 @@ from arena.robots.own_controller import Policy, load_controller
 from arena.robots.senses import SenseReader, Senses
 from arena.scene import dimensions
 from arena.scene.loader import FCY, Scene, load_scene, scripted
+from arena.scene.robot_kind import EPUCK
 from arena.world.physics import World
 
 SENSED: Final = 3
@@ -63,6 +64,16 @@ class ArenaEnv(ParallelEnv):  # type: ignore[misc]
     simulated seconds and terminated by the experiment's `done`. With `render_mode="rgb_array"`, `render` returns a
     picture of the arena from above.
 
+    >>> from arena.env import ArenaEnv
+    >>> env = ArenaEnv("aggregation", seconds=1.0)
+    >>> observations, _ = env.reset(seed=1)
+    >>> len(observations), observations[env.agents[0]].shape
+    (8, (21,))
+    >>> actions = {agent: (0.5, 0.5) for agent in env.agents}
+    >>> _, rewards, _, truncations, _ = env.step(actions)
+    >>> any(truncations.values())
+    False
+
     A pickled or copied environment repeats its episode from the seed and the actions, which gives the same numbers;
     changes by `stage` are not repeated.
 
@@ -91,6 +102,8 @@ class ArenaEnv(ParallelEnv):  # type: ignore[misc]
         if isinstance(scene, str) and found.experiment.endswith(".py"):
             found = replace(found, experiment=str((Path(scene).parent / found.experiment).resolve()))
         self.scene: Final = found if image is not None else scripted(found)
+        if any(group.kind != EPUCK.name for group in self.scene.groups):
+            raise ValueError(f"{self.scene.name}: robots.kind: an environment has e-pucks only")
         self.experiment: Final[Experiment] = experiment_of(self.scene.experiment)
         self._ticks: Final = round(decision_s * FCY / self.scene.clock.quantum_tcy)
         if self._ticks < 1 or not seconds > 0:

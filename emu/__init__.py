@@ -1,11 +1,15 @@
 """A cycle-exact emulator of the dsPIC30F6014A, by default on an e-puck.
 
     >>> import emu
-    >>> machine = emu.load("firmware.elf")                          # doctest: +SKIP
-    >>> machine.uart[1].listen(lambda byte, cycle: print(chr(byte), end=""))  # doctest: +SKIP
-    >>> stop = machine.run(seconds=2)                               # doctest: +SKIP
-    >>> stop.reason, stop.fault                                     # doctest: +SKIP
+    >>> image = emu.build("main.c", output="firmware.elf")
+    >>> machine = emu.load(image)
+    >>> stop_listening = machine.uart[1].listen(lambda byte, cycle: print(chr(byte), end=""))
+    >>> stop = machine.run(seconds=0.002)
+    ready
+    >>> stop.reason, stop.fault
     ('limit', None)
+
+The examples of this reference use docs/examples/api.c as `main.c`; a test runs them.
 
 `load` returns a `Machine` for a firmware file. Its methods run it, read and change its state, install hooks and take
 snapshots. A run ends with a `Stop`. If the firmware failed, `Stop.fault` has the cause, the place, the thread, the call

@@ -54,6 +54,11 @@ if TYPE_CHECKING:
 class Machine(BareMachine):
     """A machine with a debugger attached: access by source names, and stops that explain firmware faults.
 
+    >>> import emu
+    >>> machine = emu.load("tests/emu/cli/hello.hex")
+    >>> machine.run().reason, machine.var("U1BRG * 2"), machine.threads()
+    ('halt', 14, [])
+
     With `strict`, null pointers, uninitialised reads and stores into other threads' stacks are faults
     (emu/debug/strict.py); this needs the plain engine. The other arguments are those of `emu.machine.machine.Machine`.
     Raises ValueError for an unknown engine, or for another engine than plain with `strict`.
@@ -272,7 +277,13 @@ class BuildError(RuntimeError):
 
 @dataclass(frozen=True, slots=True)
 class Change:
-    """Change of a watched value. The instruction that ended before `cycle` made it; `pc` is the next instruction."""
+    """Change of a watched value. The instruction that ended before `cycle` made it; `pc` is the next instruction.
+
+    >>> import emu
+    >>> first = next(emu.watch(emu.load("tests/emu/cli/hello.hex"), "U1BRG"))
+    >>> first.old, first.new
+    (0, 7)
+    """
 
     cycle: int
     pc: int

@@ -18,26 +18,10 @@ from pathlib import Path
 
 import import_graph
 import kernel_reference
+import python_reference
 
 ROOT = Path(__file__).resolve().parents[2]
 PROGRAMS = ("emu", "toolchain", "arena", "openswarm")
-MODULES = (
-    "emu",
-    "emu.api",
-    "emu.machine.machine",
-    "emu.machine.fault",
-    "emu.boards.epuck.board",
-    "emu.boards.epuck.exchange",
-    "emu.debug.history",
-    "emu.host.paths",
-    "emu.host.exit_status",
-    "arena.env",
-    "arena.scene.schema",
-    "arena.experiments",
-    "arena.metrics",
-    "arena.trial.record",
-)
-"""Public modules whose reference pages are generated from docstrings."""
 LINK = re.compile(r"(\]\()([^)\s]+)(\))")
 
 
@@ -98,9 +82,7 @@ def reference(source: Path) -> None:
     folder.mkdir()
     for program in PROGRAMS:
         (folder / f"{program}.md").write_text(help_of(program), encoding="utf-8")
-    options = "    options:\n      heading_level: 3\n      show_root_heading: false\n"
-    python = "".join(f"## {name}\n\n::: {name}\n{options}\n" for name in MODULES)
-    (folder / "python.md").write_text(f"# Python interfaces\n\n{python}", encoding="utf-8")
+    (folder / "python.md").write_text(python_reference.page(), encoding="utf-8")
     (folder / "imports.md").write_text(import_graph.page(folder), encoding="utf-8")
     (folder / "kernel-calls.md").write_text(kernel_reference.page(), encoding="utf-8")
     (folder / "pages.md").write_text(all_pages(source), encoding="utf-8")

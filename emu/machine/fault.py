@@ -1,4 +1,16 @@
-"""Report of a firmware fault as plain data: cause, place, thread, call stack and last branches."""
+"""Report of a firmware fault as plain data: cause, place, thread, call stack and last branches.
+
+>>> import emu
+>>> machine = emu.load("firmware.elf")
+>>> machine.pc = machine.program_address("broken")
+>>> report = machine.run().fault                # a FaultReport
+>>> report.facts()["cause"]
+'address error trap: reading 2 bytes at 0x0801, an odd address, no handler'
+>>> report.frames[0].function, report.thread    # frames are of type StackEntry
+('broken', None)
+>>> report.branches                             # of type TakenBranch
+()
+"""
 
 from __future__ import annotations
 
@@ -40,6 +52,7 @@ class FaultReport:
     """Description of a firmware fault. `pc` is the faulty instruction, or the best estimate of it."""
 
     cause: str
+    """What failed; ends with a comma where the sentence with the place needs one."""
     pc: int
     cycle: int
     where: str = ""
@@ -87,7 +100,7 @@ class FaultReport:
     def facts(self) -> dict[str, Any]:
         """Return the report as JSON-compatible data."""
         return {
-            "cause": self.cause,
+            "cause": self.cause.rstrip(","),
             "pc": self.pc,
             "cycle": self.cycle,
             "symbol": self.symbol,

@@ -185,7 +185,9 @@ def test_errors_in_sources_are_json(tmp_path: Path, capsys: pytest.CaptureFixtur
 def test_emu_outputs(run: Callable[..., Any], images: dict[str, str], capsys: pytest.CaptureFixture[str]) -> None:
     """Outputs of `emu` for images without the kernel."""
     assert run("emu", "run {hello} --stats --seconds 1")["uart1"] == "hello"
-    assert run("emu", "run {fault} --seconds 1", status=1)["fault"]["symbol"].startswith("_main")
+    fault = run("emu", "run {fault} --seconds 1", status=1)["fault"]
+    assert fault["symbol"].startswith("_main")
+    assert fault["cause"].endswith("no handler")
     run("emu", "info {hello}")
     run("emu", "coverage {hello} --seconds 0.001")
     assert run("emu", "coverage {fault} --seconds 0.001", status=1)["fault"]["pc"] > 0

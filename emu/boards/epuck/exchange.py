@@ -25,7 +25,16 @@ LEFT, RIGHT = 0, 1
 
 
 class Outputs:
-    """The robot's outputs as arrays, which `update` fills in place."""
+    """The robot's outputs as arrays, which `update` fills in place.
+
+    >>> import emu
+    >>> machine = emu.load("firmware.elf")
+    >>> machine.run(seconds=0.001).reason
+    'limit'
+    >>> machine.board.outputs.update()
+    >>> machine.board.outputs.steps.tolist(), bool(machine.board.outputs.leds.any())
+    ([0, 0], False)
+    """
 
     def __init__(self, board: EpuckHardware) -> None:
         self._board: Final = board
@@ -68,7 +77,14 @@ class Outputs:
 
 
 class Inputs:
-    """The robot's inputs. Write the arrays and attributes, then call `apply`."""
+    """The robot's inputs. Write the arrays and attributes, then call `apply`.
+
+    >>> import emu
+    >>> inputs = emu.load("firmware.elf").board.inputs
+    >>> inputs.distance[0] = 20.0      # mm
+    >>> inputs.battery = 3.5           # V
+    >>> inputs.apply()
+    """
 
     def __init__(self, board: EpuckHardware) -> None:
         self._board: Final = board
