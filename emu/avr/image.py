@@ -7,10 +7,11 @@ at 0x800000 and the EEPROM at 0x810000 (binutils' emulation `avr5`).
 from __future__ import annotations
 
 import io
+import re
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from emu.avr.core.state import EEPROM_BYTES, FLASH_BYTES
 from emu.host.files import read_file
@@ -19,11 +20,21 @@ from emu.image.lines import LineTable
 from emu.image.model import LoadError
 from emu.image.symbols import Symbol, Symbols
 
+if TYPE_CHECKING:
+    from elftools.elf.elffile import ELFFile
+
 DATA_SPACE: Final = 0x800000
 EEPROM_SPACE: Final = 0x810000
 INFO_SPACE: Final = 0x820000
 """Start of fuses, lock bits and signature in the address space of an ELF file."""
+INFO_END: Final = 0x860000
 EM_AVR: Final = 83
+AVR5: Final = 5
+"""Architecture of the ATmega328P in `e_flags`: two-word vectors, 16 KB of flash and more (binutils' `avr5`)."""
+DEVICE_NOTE: Final = ".note.gnu.avr.deviceinfo"
+_DEVICE: Final = re.compile(rb"at(?:mega|tiny|xmega|90)[a-z0-9]*")
+_COMPATIBLE: Final = re.compile(r"atmega(?:168|328).*")
+"""Devices with the registers and vectors of the ATmega328P. The ATmega168 has less memory."""
 MAX_OCTETS: Final = 16 << 20
 """Maximum size of a file in octets."""
 EXPECTED: Final = "expected an ELF executable for AVR (ATmega328P) or an Intel HEX file"
@@ -139,7 +150,7 @@ def _read_hex(data: bytes, path: str) -> AvrImage:
             ended = True
         elif kind in (LINEAR, SEGMENT):
             upper = int.from_bytes(payload, "big") << (16 if kind == LINEAR else 4)
-        elif kind == DATA:
+        elif kind == DATA and not INFO_SPACE <= upper + address < INFO_END:
             memory.put(upper + address, payload, where)
     if not ended:
         raise LoadError(path, f"is truncated: no end-of-file record after line {number}")
@@ -154,6 +165,7 @@ def _read_elf(data: bytes, path: str) -> AvrImage:
         raise LoadError(path, f"is an ELF file for {elf['e_machine']}; {EXPECTED}")
     if elf["e_type"] != "ET_EXEC":
         raise LoadError(path, f"is an object or library that is not linked; {EXPECTED}")
+    _refuse_other_device(elf, path)
     memory = _Memory(path)
     for number, segment in enumerate(elf.iter_segments()):
         if segment["p_type"] != "PT_LOAD" or not segment["p_filesz"] or segment["p_paddr"] >= INFO_SPACE:
@@ -167,6 +179,17 @@ def _read_elf(data: bytes, path: str) -> AvrImage:
     sections = tuple((section.name, section.data()) for section in elf.iter_sections()
                      if section.name.startswith(".debug_") and section["sh_type"] != "SHT_NOBITS")  # fmt: skip
     return memory.image(symbols, sections)
+
+
+def _refuse_other_device(elf: ELFFile, path: str) -> None:
+    """Raise LoadError if the file is built for a microcontroller that the ATmega328P cannot stand in for."""
+    note = elf.get_section_by_name(DEVICE_NOTE)
+    named = _DEVICE.search(note.data()) if note is not None else None
+    if named and not _COMPATIBLE.fullmatch(device := named[0].decode("ascii")):
+        raise LoadError(path, f"is built for the {device}; {EXPECTED}")
+    family = elf["e_flags"] & 0x7F  # bit 7: prepared for linker relaxation
+    if family != AVR5:
+        raise LoadError(path, f"is built for the architecture avr{family}, not avr{AVR5}; {EXPECTED}")
 
 
 def _symbols(table: object) -> list[Symbol]:

@@ -10,7 +10,7 @@ import pytest
 
 from emu.avr.image import load_avr_image, parse_avr_image
 from emu.image.model import LoadError
-from tests.emu.avr.conftest import Build
+from tests.emu.avr.conftest import Build, needs
 from tests.fuzz.seeds import base_seed
 
 PROGRAM = """
@@ -57,6 +57,39 @@ def test_refusals(tmp_path: Path) -> None:
         load_avr_image(str(tmp_path))
     with pytest.raises(LoadError, match="cannot be read"):
         load_avr_image(str(tmp_path / "none.elf"))
+
+
+def test_fuses_and_eeprom_in_a_hex_file() -> None:
+    """avr-objcopy writes EEPROM at 0x810000 and fuses from 0x820000: the first is loaded, the others are ignored."""
+    records = """
+        :02000004008179
+        :010001009A64
+        :02000004008278
+        :03000000E2D9FF43
+        :020000040000FA
+        :02000000FFCF30
+        :00000001FF
+        """
+    image = parse_avr_image(records.encode("ascii"), "fuses.hex")
+    assert image.eeprom == {1: 0x9A}
+    assert image.flash_used == 2
+
+
+def test_other_microcontrollers_are_refused(tmp_path: Path) -> None:
+    """A file for another AVR names it; the ATmega328 and the ATmega168 have the same registers and vectors."""
+    needs("avr-gcc")
+    source = tmp_path / "p.c"
+    source.write_text("int main(void) { for (;;) ; }\n")
+    for device, text in (("atmega644", "is built for the atmega644"), ("attiny85", "is built for the attiny85"),
+                         ("avr4", "architecture avr4, not avr5"), ("atmega328", ""), ("atmega168p", "")):  # fmt: skip
+        out = tmp_path / f"{device}.elf"
+        start = ["-nostdlib", "-Wl,--entry=main"] if device.startswith("avr") else []
+        subprocess.run(["avr-gcc", f"-mmcu={device}", *start, str(source), "-o", str(out)], check=True)
+        if text:
+            with pytest.raises(LoadError, match=text):
+                load_avr_image(str(out))
+        else:
+            assert load_avr_image(str(out)).flash_used > 100
 
 
 def test_damaged_files_are_refused(build: Build) -> None:
