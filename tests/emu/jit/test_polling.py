@@ -75,7 +75,7 @@ def test_a_loop_that_only_waits_is_empty(words: list[int]) -> None:
 
 @pytest.mark.parametrize("words", BUSY.values(), ids=BUSY)
 def test_a_loop_that_does_something_is_not(words: list[int]) -> None:
-    """A loop that breaks one of the conditions is not empty."""
+    """A loop with a store, a read of a changing value, or results of an earlier iteration is not empty."""
     assert loops_of(words) == 0
 
 

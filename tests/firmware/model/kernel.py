@@ -27,7 +27,7 @@ class Kernel(Remote):
 
     @call("Sys_Kill_Process", "MTH")
     def kill(self, pid: int) -> bool:
-        """End a thread. The one in whose call cleanups run ends after them."""
+        """End a thread. If cleanups of other threads run on its stack, it ends after these cleanups."""
         if self.host is not None and self.host.pid == pid and pid:
             self.host_ends = True
             return True

@@ -27,20 +27,20 @@ class Slot:
 
 @dataclass(slots=True)
 class Heard:
-    """What was heard of a robot: its newest sequence number and those up to WINDOW before."""
+    """Received sequence numbers of a robot: the newest one, and those up to WINDOW before it."""
 
     newest: int
     older: set[int]
 
 
 class Remote(Waits):
-    """Sharing: a sent event goes to the neighbours, too; theirs is sent here, once."""
+    """Shared events: an event sent here is sent to the neighbours, too; a neighbour's is sent here once."""
 
     def __init__(self, sizes: Sizes, code: Code) -> None:
         super().__init__(sizes, code)
         self.slots_of_shared = [Slot() for _ in range(sizes.remote_events)]
         self.share_gates: dict[int, Event] = {}
-        """Memory taken by sharing an event, and the event it was taken for."""
+        """The event for which the gate of a number was created; a gate takes memory."""
         self.heard: dict[int, Heard] = {}
         self.arriving = False
         self.frames = 0
