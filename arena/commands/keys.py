@@ -13,9 +13,10 @@ from arena.scene.schema import LIMITS, LISTS, TABLES
 from arena.trial.strict_json import json_text
 from emu.host.errors import CommandParser
 
-UNITS: Final = {"cm": "cm", "deg": "degrees", "s": "s", "ms": "ms", "us": "us", "tcy": "Tcy", "n": "N", "kg": "kg",
+UNITS: Final = {"cm_s": "cm/s", "deg_s": "degrees/s",
+                "cm": "cm", "deg": "degrees", "s": "s", "ms": "ms", "us": "us", "tcy": "Tcy", "n": "N", "kg": "kg",
                 "counts": "ADC counts", "share": "share", "volts": "V", "hours": "h"}  # fmt: skip
-"""Unit by the last word of a key."""
+"""Unit by the last one or two words of a key."""
 _HEAD: Final = """# Keys of scene files
 
 For users who write a scene: every key with its type, unit, range and default, as `arena keys --markdown` prints them.
@@ -83,7 +84,8 @@ def keys_of(table: str) -> Iterator[Key]:
     for one in fields(kind):
         value = getattr(defaults, one.name)
         low, high = limits.get(one.name, (None, None))
-        unit = UNITS.get(one.name.rpartition("_")[2], "") if not isinstance(value, str) else ""
+        words = one.name.split("_")
+        unit = UNITS.get("_".join(words[-2:])) or UNITS.get(words[-1], "")
         yield Key(title, one.name, _TYPES[type(value).__name__], unit, low, _finite(high), _default(value))
 
 

@@ -19,7 +19,8 @@ from arena.experiments import experiment_file
 from arena.robots.epuck import SELECTOR
 from arena.robots.images import image_for
 from arena.robots.reactive import SPEED_TABLES
-from arena.scene.loader import Scene, load_scene, scripted
+from arena.scene.loader import Scene, SceneError, load_scene, scripted
+from arena.scene.robot_kind import EPUCK, KILOBOT
 from arena.scene.schema import RobotGroup
 from arena.trial.manifest import note_host_time
 from arena.trial.record import EXPERIMENT, Trial, trials_in, write_bytes
@@ -136,15 +137,23 @@ def plan_from(options: argparse.Namespace, trials: int) -> Plan:
         scene = replace(scene, groups=tuple(replace(group, image="") for group in scene.groups))
     if options.brain not in (None, SCRIPTED) and all(group.controller not in ("", *SELECTOR) for group in scene.groups):
         scene = replace(scene, groups=tuple(replace(group, controller="") for group in scene.groups))
-    own_images = list(dict.fromkeys(group.image for group in scene.groups if group.image))
-    images = tuple((one, image_for(one, home)) for one in own_images)
+    kinds: dict[str, str] = {}
+    for group in scene.groups:
+        if group.image and kinds.setdefault(group.image, group.kind) != group.kind:
+            raise SceneError(f"{scene.name}: robots.image: groups of different kinds have the image {group.image!r}; "
+                             "name their files")  # fmt: skip
+    own_images = list(kinds)
+    images = tuple((one, image_for(one, home, kind)) for one, kind in kinds.items())
+    bare = {group.kind for group in scene.groups if not group.image}
+    if KILOBOT.name in bare and (len(bare) > 1 or options.brain is None):
+        raise SceneError(f"{scene.name}: robots.image: a Kilobot runs the image of a firmware; none is named")
     if scene.groups and all(group.image for group in scene.groups):
         brain, image = "+".join(dict.fromkeys(Path(one).stem for one in own_images)), None
     else:
         is_python = all((one.controller or options.controller) not in (None, "", *SELECTOR)
-                        for one in scene.groups or (RobotGroup(),))  # fmt: skip
+                        for one in scene.groups or (RobotGroup(),) if not one.image)  # fmt: skip
         name = options.brain or (SCRIPTED if is_python else DEFAULT_BRAIN)
-        brain, image = Path(name).stem, image_for(name)
+        brain, image = Path(name).stem, image_for(name, kind=KILOBOT.name if KILOBOT.name in bare else EPUCK.name)
     own, (controller, controllers) = experiment_file(scene.experiment, home), _controllers(scene, options, home)
     if controller not in SELECTOR and image is not None:
         raise ValueError(f"--controller {options.controller} runs in Python: use it without --brain {options.brain}")
@@ -182,6 +191,8 @@ def _controllers(scene: Scene, options: argparse.Namespace, home: Path) -> tuple
 def has_choice_of_controller(plan: Plan) -> bool:
     """Whether the controller of the run determines the speeds or the selector of any robot."""
     for group in plan.scene.groups or (RobotGroup(),):
+        if group.kind == KILOBOT.name:
+            continue
         image = plan.image_of(group)
         selector = plan.scene.start.selector if group.selector < 0 else group.selector
         if not group.controller and (image is None or (selector < 0 and plan.controller in SELECTOR)):

@@ -114,7 +114,7 @@ class ControlledRobot:
         """Take control of the robot in a new or repeated trial. Raises ValueError if the robot has no firmware."""
         controller = controllers[self._robot]
         if not isinstance(controller, FirmwareController):
-            raise ValueError(f"--robot {self._robot}: it has no firmware, its brain is scripted")
+            raise ValueError(f"--robot {self._robot}: it runs no firmware of an e-puck but {controller.place()}")
         self._world, self._controllers, self._controller = world, controllers, controller
         self._set_native(False)
         self.machine = controller.machine

@@ -131,7 +131,7 @@ def sample_data(trial: Trial) -> dict[str, Any]:
         "curves": {name: values.tolist() for name, values in series.curves.items()},
         "log": columns["log"],
         "lights": columns["lights"],
-        "messages": columns["messages"] if trial.scene.bluetooth.links else [[] for _ in trial.times],
+        "messages": columns["messages"] if "messages" in columns else [[] for _ in trial.times],
         "faults": trial.about["faults"],
     }
 

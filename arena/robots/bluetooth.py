@@ -41,9 +41,7 @@ class BluetoothLinks:
                 text = sent.decode("ascii", "backslashreplace")
                 self._delivered.append({"robot": robot, "to": partner, "cycle": tick * self._quantum, "text": text})
 
-    def take_messages(self) -> dict[str, list[dict[str, Any]]]:
-        """Return the record's column of messages delivered since the last call: sender, receiver, trial cycle, text."""
-        if not self._partners:
-            return {}
+    def take_messages(self) -> list[dict[str, Any]]:
+        """Return the messages delivered since the last call, for the record: sender, receiver, trial cycle, text."""
         delivered, self._delivered = self._delivered, []
-        return {"messages": delivered}
+        return delivered

@@ -40,14 +40,15 @@ pixels (openswarm-original.md §8)."""
 
 
 class SerialLine(NamedTuple):
-    """A line that a robot sent on UART1; `cycle` of the trial is that of its first byte."""
+    """A line that a robot sent on UART1, or a message by infrared; `cycle` of the trial is that of its first byte, or
+    of the end of the message."""
 
     cycle: int
     text: str
 
 
 class LedChange(NamedTuple):
-    """The state of a robot's LEDs after a change at `cycle` of the trial; bit n: ring LED n, 8 front, 9 body."""
+    """The state of a robot's LEDs after a change at `cycle` of the trial, as `Reading.leds`."""
 
     cycle: int
     leds: int
@@ -62,7 +63,8 @@ class Reading:
     load: float = 0.0
     """Share of the CPU's cycles since the last sample that were not idle."""
     leds: int = 0
-    """Bit n: ring LED n; 8 front, 9 body."""
+    """Of an e-puck bit n: ring LED n; 8 front, 9 body. Of a Kilobot its colour: red + 4 green + 16 blue, each 0 to
+    3."""
     strip: bytes = b""
     """Red, green, blue of at most STRIP_PIXELS pixels in STRIP_COLUMNS, left to right, of the last line near the middle
     of the picture that the firmware read: with noise, before the sensor's gains. Empty if it read none."""
@@ -93,6 +95,9 @@ class Controller(Protocol):
 
     def take_lines(self) -> list[SerialLine]:
         """Return the lines sent on UART1 since the last call."""
+
+    def take_messages(self) -> list[SerialLine]:
+        """Return the messages sent to all robots in reach since the last call."""
 
     def take_led_changes(self) -> list[LedChange]:
         """Return the LED changes since the last call."""
@@ -128,6 +133,10 @@ class ControllerWithoutUart:
 
     def take_lines(self) -> list[SerialLine]:
         """Return no lines: this controller has no UART."""
+        return []
+
+    def take_messages(self) -> list[SerialLine]:
+        """Return no messages: this controller sends none."""
         return []
 
     def take_led_changes(self) -> list[LedChange]:

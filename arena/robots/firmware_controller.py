@@ -417,6 +417,10 @@ class FirmwareController:
         lines, self._lines = self._lines, []
         return lines
 
+    def take_messages(self) -> list[SerialLine]:
+        """As `Controller.take_messages`: an e-puck sends none to all; its infrared light is not decoded."""
+        return []
+
     def take_led_changes(self) -> list[LedChange]:
         """As `Controller.take_led_changes`."""
         changed, self._led_changes = self._led_changes, []

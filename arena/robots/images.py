@@ -10,6 +10,8 @@ from pathlib import Path
 from typing import Final
 
 import emu
+from arena.scene.robot_kind import EPUCK, KILOBOT
+from emu.avr.image import load_avr_image
 from emu.host import paths
 from emu.host.private_folder import danger, make_private
 
@@ -17,12 +19,14 @@ APPLICATIONS: Final = {"openswarm": "clustering", "bare": "clustering-bare"}
 """Applications of firmware/apps with a name of their own as a brain."""
 
 
-def image_for(brain: str, home: Path = Path()) -> Path | None:
+def image_for(brain: str, home: Path = Path(), kind: str = EPUCK.name) -> Path | None:
     """Return the image of a brain: an application of the project, which is built, or a file, relative to `home`.
 
-    Returns None for `scripted`. Raises LoadError if the file is not an image, ValueError for an unknown name or a
-    failed build.
+    Returns None for `scripted`. Raises LoadError if the file is not an image for this kind of robot, ValueError for an
+    unknown name or a failed build.
     """
+    if kind == KILOBOT.name:
+        return _kilobot_image(brain, home)
     if brain == "scripted":
         return None
     application = APPLICATIONS.get(brain, brain)
@@ -36,20 +40,44 @@ def image_for(brain: str, home: Path = Path()) -> Path | None:
         return path
     if not is_own:
         raise ValueError(f"--brain {brain}: there is no firmware/apps/{application} beside this package")
-    folder = paths.firmware()
-    # an installed package or a checkout may not be writable: images then go into the user's cache
-    is_own_folder = paths.in_checkout() and os.access(folder, os.W_OK)
-    out = folder / "build" / application if is_own_folder else paths.images() / application
-    if not is_own_folder:
-        make_private(out)
-        for one in (paths.cache(), paths.images(), out):
-            if why := danger(one):
-                raise ValueError(f"{one}: {why}; delete it, or set OPENSWARM_CACHE to a folder of your own")
-    command = ["make", "-C", str(folder), f"APP={application}", f"OUT={out}", f"PYTHON={sys.executable}"]
+    out = _output_folder(paths.firmware(), application)
+    _make(brain, paths.firmware(), f"APP={application}", f"OUT={out}", f"PYTHON={sys.executable}")
+    return out / "firmware.elf"
+
+
+def _kilobot_image(brain: str, home: Path) -> Path:
+    """Return the image of a Kilobot: a program of firmware/kilobot, which avr-gcc builds, or a file."""
+    folder = paths.firmware() / "kilobot"
+    if not re.fullmatch("[a-z0-9-]+", brain) or not (folder / "programs" / f"{brain}.c").is_file():
+        path = home / brain
+        if not path.exists():
+            known = ", ".join(sorted(one.stem for one in (folder / "programs").glob("*.c")))
+            raise ValueError(f"image {brain}: no such file; expected an ELF or HEX file for AVR, or one of {known}")
+        load_avr_image(str(path))
+        return path
+    out = _output_folder(folder, "")
+    _make(brain, folder, f"PROGRAM={brain}", f"OUT={out}")
+    return out / f"{brain}.elf"
+
+
+def _output_folder(folder: Path, name: str) -> Path:
+    """Return the folder for images of a folder of firmware: below it, or in the user's cache if it is not writable."""
+    if paths.in_checkout() and os.access(folder, os.W_OK):
+        return folder / "build" / name
+    out = paths.images() / (name or folder.name)
+    make_private(out)
+    for one in (paths.cache(), paths.images(), out):
+        if why := danger(one):
+            raise ValueError(f"{one}: {why}; delete it, or set OPENSWARM_CACHE to a folder of your own")
+    return out
+
+
+def _make(brain: str, folder: Path, *arguments: str) -> None:
+    """Run `make` in a folder of firmware. Raises ValueError if it fails."""
+    command = ["make", "-C", str(folder), *arguments]
     try:
         built = subprocess.run(command, capture_output=True, text=True, check=False)
     except OSError as error:
         raise ValueError(f"--brain {brain}: `make` does not run: {error}") from None
     if built.returncode:
         raise ValueError(f"--brain {brain}: {' '.join(command)} failed:\n{built.stderr.strip()}")
-    return out / "firmware.elf"

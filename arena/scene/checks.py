@@ -10,8 +10,11 @@ from arena.scene import geometry
 from arena.scene.robot_kind import KINDS
 from arena.scene.schema import INHERIT, LIMITS, NAMED, PLACES, ObjectKind, Points, RobotGroup
 from emu.boards.epuck.remote import KEYS
+from emu.boards.kilobot.messages import TYPES
 
 COLOUR: Final = re.compile(r"#[0-9a-fA-F]{6}")
+MOST_SECONDS: Final = 1e7
+"""Longest time of a command of the overhead controller."""
 CONTROLLER: Final = re.compile(r"|A|B|[a-z][a-z0-9_]*|[^\0]+\.py")
 """Table A or B, entry point, or Python file of a controller."""
 
@@ -102,6 +105,35 @@ def check_key(errors: TableErrors, table: str, key: str, number: int | None = No
         raise errors.at(table, "remote", words, number)
 
 
+def overhead_commands(text: str) -> list[tuple[float, str, float]]:
+    """Return the commands of the overhead controller in order: start in s, command, and for how many s. Raises
+    ValueError with the wrong part."""
+    found: list[tuple[float, str, float]] = []
+    for part in filter(None, map(str.strip, text.split(";"))):
+        words = part.split()
+        if len(words) != 3 or words[1] not in TYPES:
+            raise ValueError(part)
+        try:
+            start, seconds = float(words[0]), float(words[2])
+        except ValueError:
+            raise ValueError(part) from None
+        after = found[-1][0] + found[-1][2] if found else 0.0
+        if not (after <= start <= MOST_SECONDS and 0 < seconds <= MOST_SECONDS):
+            raise ValueError(part)
+        found.append((start, words[1], seconds))
+    return found
+
+
+def check_overhead(errors: TableErrors, text: str) -> None:
+    """Check the commands of the overhead controller. Raises SceneError."""
+    try:
+        overhead_commands(text)
+    except ValueError as error:
+        words = (f'kilobots.overhead: {str(error)!r:.60}: expected "SECOND COMMAND SECONDS; ...", one after the other, '
+                 f"with a command of {', '.join(TYPES)}")  # fmt: skip
+        raise errors.at("kilobots", "overhead", words) from None
+
+
 def check_placed(errors: TableErrors, table: str, one: Any, number: int) -> None:
     """Check the placement of a table. Raises SceneError."""
     if one.place not in PLACES:
@@ -123,6 +155,9 @@ def check_group(errors: TableErrors, table: str, one: RobotGroup, number: int) -
         raise errors.at(table, "heading_deg", words, number)
     if not CONTROLLER.fullmatch(one.controller):
         words = f"{table}.controller is {one.controller!r}; expected A, B, the path of a .py file, or an entry point"
+        raise errors.at(table, "controller", words, number)
+    if one.kind == "kilobot" and one.controller:
+        words = f"{table}.controller {one.controller!r} drives an e-puck; a Kilobot runs an `image`"
         raise errors.at(table, "controller", words, number)
     if one.image and one.controller not in ("", "A", "B"):
         words = f"{table}.controller {one.controller!r} runs in Python; a group with an `image` runs firmware"

@@ -28,6 +28,11 @@ BRAKE: Final = 1.04
 The gears cannot be turned by the wheels. The value is above THRUST: otherwise one robot could push another for ever.
 """
 
+KILOBOT_RADIUS, KILOBOT_HEIGHT = 1.65, 3.4
+"""Half of 33 mm; 34 mm with the legs (kilobot.md §1)."""
+KILOBOT_MASS: Final = 0.01
+"""Value of ARGoS (kilobot.md §1). UNVERIFIED on a robot."""
+
 OBJECT_RADIUS: Final = 5.0
 OBJECT_HEIGHT: Final = 10.0
 OBJECT_MASS: Final = 0.035

@@ -22,6 +22,7 @@ from arena.scene.checks import (
     check_limits,
     check_links,
     check_off,
+    check_overhead,
     check_polygon,
     check_shape,
     wrong_points,
@@ -38,6 +39,7 @@ from arena.scene.schema import (
     CameraSetting,
     Clock,
     InfraredSetting,
+    Kilobots,
     Lamp,
     Light,
     Marks,
@@ -75,6 +77,7 @@ class Scene:
     battery: BatterySetting = field(default_factory=BatterySetting)
     start: Start = field(default_factory=Start)
     bluetooth: Bluetooth = field(default_factory=Bluetooth)
+    kilobots: Kilobots = field(default_factory=Kilobots)
     clock: Clock = field(default_factory=Clock)
     groups: tuple[RobotGroup, ...] = ()
     """Groups of robots; empty: `robots.count` robots of one kind on marks."""
@@ -239,7 +242,39 @@ def load_scene(name: str) -> Scene:
     except (OSError, RecursionError, ValueError) as error:
         raise SceneError(f"{path}: {error}") from None
     errors = TableErrors(str(path), text)
+    _read_poses(errors, data, path.parent)
     return _checked(_scene(errors, data), errors)
+
+
+def _read_poses(errors: TableErrors, data: dict[str, Any], home: Path) -> None:
+    """Replace names of files in `poses` of [[robots]] and [[objects]] by their content. Raises SceneError."""
+    for name in _LIST_OF:
+        tables = data.get(name)
+        for number, table in enumerate(tables if isinstance(tables, list) else ()):
+            file = table.get("poses") if isinstance(table, dict) else None
+            if isinstance(file, str):
+                table["poses"] = _poses_in(errors, name, home / file, number)
+
+
+def _poses_in(errors: TableErrors, table: str, file: Path, number: int) -> list[list[float]]:
+    """Return the poses in a file, one `x,y` or `x,y,degrees` per line; empty lines and # comments are skipped."""
+    poses = []
+    try:
+        lines = read_file(file).decode().splitlines()
+    except (OSError, ValueError) as error:
+        raise errors.at(table, "poses", f"{table}.poses: {error}", number) from None
+    for at, line in enumerate(lines, start=1):
+        text = line.partition("#")[0].strip()
+        try:
+            pose = [float(value) for value in text.split(",")] if text else []
+        except ValueError:
+            pose = [math.nan]
+        if text and (len(pose) not in (2, 3) or not all(map(math.isfinite, pose))):
+            raise errors.at(table, "poses", f"{table}.poses: {file}:{at}: {text!r:.60}; expected x,y or x,y,degrees",
+                            number)  # fmt: skip
+        if pose:
+            poses.append(pose)
+    return poses
 
 
 def scene_of(values: dict[str, Any]) -> Scene:
@@ -334,6 +369,7 @@ def _checked(scene: Scene, errors: TableErrors) -> Scene:
         raise errors.at("", "name", f"name is {scene.name!r}; expected up to 64 letters, digits, blanks and -_., "
                         "a letter or digit first: results go into a folder of this name")  # fmt: skip
     check_key(errors, "start", scene.start.remote)
+    check_overhead(errors, scene.kilobots.overhead)
     for name in LISTS:
         table = {"groups": "robots", "kinds": "objects"}.get(name, name)
         for number, one in enumerate(getattr(scene, name)):

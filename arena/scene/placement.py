@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
+from functools import cache
 from typing import Final
 
 import numpy as np
@@ -28,6 +29,15 @@ def marks_of(scene: Scene) -> list[Place]:
     places = ((left + c * grid.spacing_cm, low + r * grid.spacing_cm) for r in range(grid.rows)
               for c in range(grid.columns))  # fmt: skip
     return [(x, y) for x, y in places if 0 < x < arena.width_cm and 0 < y < arena.height_cm]
+
+
+@cache
+def hexagonal(count: int, spacing: float) -> list[Place]:
+    """Return the `count` points of a hexagonal lattice that are nearest to its origin, nearest first; then by angle."""
+    reach = math.ceil(math.sqrt(count)) + 1
+    points: list[Place] = [(spacing * (column + row % 2 / 2), spacing * row * math.sqrt(3) / 2)
+              for row in range(-reach, reach + 1) for column in range(-reach, reach + 1)]  # fmt: skip
+    return sorted(points, key=lambda at: (round(math.hypot(*at), 6), round(math.atan2(at[1], at[0]), 6)))[:count]
 
 
 def place_all(scene: Scene, rng: np.random.Generator) -> tuple[list[tuple[float, float, float]], list[Place]]:
@@ -157,6 +167,10 @@ class _Placer:
         if one.place == "circle":
             angle = 2 * math.pi * index / max(one.count, 1)
             yield x + one.circle_cm * math.cos(angle), y + one.circle_cm * math.sin(angle)
+            return
+        if one.place == "hexagonal":
+            dx, dy = hexagonal(one.count, one.spacing_cm)[index]
+            yield x + dx, y + dy
             return
         wide, deep = one.width_cm or arena.width_cm, one.depth_cm or arena.height_cm
         for _ in range(TRIES):

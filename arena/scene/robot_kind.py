@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import Any, Final, NamedTuple
 
 from arena.scene import dimensions
-from arena.scene.schema import Robots
+from arena.scene.schema import Kilobots, Robots
 
 
 class Traits(NamedTuple):
@@ -88,5 +88,33 @@ def _epuck_traits(setting: Robots, drawn: Sequence[float]) -> Traits:
 
 EPUCK: Final = RobotKind("epuck", "robots", dimensions.ROBOT_RADIUS, dimensions.ROBOT_MASS, dimensions.ROBOT_HEIGHT,
                          _wheels, _epuck_traits, "arena.robots.epuck:controllers", has_camera=True)  # fmt: skip
-KINDS: Final[dict[str, RobotKind]] = {EPUCK.name: EPUCK}
+TURN_DUTY, STRAIGHT_DUTY = 70, 65
+"""Calibrated duties of a nominal Kilobot's motors, of 255, for turning and for straight motion (kilobot.md §1)."""
+LEG_BACK_CM, LEG_ASIDE_CM = 0.9, 1.3
+"""Rear legs of a Kilobot behind and beside its centre (kilobot.md §1)."""
+LEAST_STRENGTH: Final = 0.3
+
+
+def motor_strengths(setting: Kilobots, drawn: Sequence[float]) -> tuple[float, float]:
+    """Return the strength of a Kilobot's left and right motor as a share of the nominal one."""
+    left, right = (max(1.0 + setting.motor_sd * one, LEAST_STRENGTH) for one in drawn[:2])
+    return left, right
+
+
+def _vibration(setting: Kilobots) -> Drive:
+    turn = math.radians(setting.turn_deg_s) / TURN_DUTY
+    return Drive(setting.thrust_n, setting.brake_n, LEG_ASIDE_CM, setting.motion_noise, 0.0,
+                 setting.speed_cm_s / STRAIGHT_DUTY, turn, LEG_BACK_CM, LEG_ASIDE_CM)  # fmt: skip
+
+
+def _kilobot_traits(setting: Kilobots, drawn: Sequence[float]) -> Traits:
+    left, right = motor_strengths(setting, drawn)
+    rest = [1.0 + setting.calibration_sd * one for one in drawn[2:]]
+    return Traits(bias=(left * rest[0], right * rest[1]))
+
+
+KILOBOT: Final = RobotKind("kilobot", "kilobots", dimensions.KILOBOT_RADIUS, dimensions.KILOBOT_MASS,
+                           dimensions.KILOBOT_HEIGHT, _vibration, _kilobot_traits,
+                           "arena.robots.kilobot:controllers")  # fmt: skip
+KINDS: Final[dict[str, RobotKind]] = {one.name: one for one in (EPUCK, KILOBOT)}
 """The kinds of robots by the name that a scene has for them."""

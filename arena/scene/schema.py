@@ -185,6 +185,44 @@ class Bluetooth:
 
 
 @dataclass(frozen=True, slots=True)
+class Kilobots:
+    """The Kilobots (kind = "kilobot"), and the overhead controller above the table.
+
+    - `speed_cm_s`: speed ahead at the calibrated duties; `turn_deg_s`: turning rate of one motor at its calibrated duty
+    - `motor_sd`: standard deviation of the strength of motors, which the calibration in the EEPROM compensates;
+      `calibration_sd`: that of the rest, which it does not
+    - `motion_noise`: share of the motion, drawn every `noise_period_s` of [chassis]
+    - `thrust_n`: force of the legs on the table while motors run; `brake_n`: force that pushes a robot at rest
+    - `clock_sd`: standard deviation of the frequency of the oscillators
+    - `reach_cm`: range of infrared between two centres; `lost_share`: share of light pulses that a receiver misses
+    - `ambient_counts`: counts of the sensor of ambient light; a lamp that lowers an infrared sensor of an e-puck by C
+      counts at 1 m raises them by `lamp_gain` C at 1 m, and with the inverse square of its distance
+    - `overhead`: the overhead controller's commands as "SECOND COMMAND SECONDS; ...": from that second on it repeats
+      the command for so many seconds. Commands: boot, reset, sleep, wakeup, charge, voltage, run, readuid, calibrate
+    - `records_messages`: whether the record has the messages that Kilobots send
+
+    UNVERIFIED: no measurement of the spreads, the noise, the forces and the lamps is published.
+
+    Robots are powered on within `spread_tcy` of [start].
+    """
+
+    speed_cm_s: float = 1.0
+    turn_deg_s: float = 45.0
+    motor_sd: float = 0.05
+    calibration_sd: float = 0.025
+    motion_noise: float = 0.1
+    thrust_n: float = 0.02
+    brake_n: float = 0.05
+    clock_sd: float = 0.005
+    reach_cm: float = 7.0
+    lost_share: float = 0.0
+    ambient_counts: int = 300
+    lamp_gain: float = 0.25
+    overhead: str = "0.2 run 0.5"
+    records_messages: bool = True
+
+
+@dataclass(frozen=True, slots=True)
 class Clock:
     """Quantum of the lock-step, the quantum if all controllers are scripted, and time between two samples."""
 
@@ -210,7 +248,9 @@ class Placed:
     - `uniform`: in a rectangle `width_cm` x `depth_cm` around the centre; 0: the whole arena
     - `normal`: normally distributed around the centre, standard deviation `sd_cm`
     - `circle`: at equal distances on a circle of radius `circle_cm` around the centre
-    - `poses`: the list `poses` of x, y, and for robots and polygons optionally the heading in degrees
+    - `hexagonal`: on a hexagonal lattice with gaps of `spacing_cm`, nearest to the centre first
+    - `poses`: the list `poses` of x, y, and for robots and polygons optionally the heading in degrees; or the name of a
+      file with one `x,y` or `x,y,degrees` per line, relative to the scene file
 
     The centre is (`x_cm`, `y_cm`), by default that of the arena.
     """
@@ -225,18 +265,20 @@ class Placed:
     depth_cm: float = 0.0
     sd_cm: float = 30.0
     circle_cm: float = 50.0
+    spacing_cm: float = 4.0
 
 
 @dataclass(frozen=True, slots=True)
 class RobotGroup(Placed):
     """Robots of one kind.
 
-    - `kind`: epuck
-    - `image`: their controller, as `--brain`; a path is relative to the scene file; empty: that of the run. `--brain`
-      replaces the images of a scene in which every group has one.
+    - `kind`: epuck or kilobot
+    - `image`: their controller, as `--brain`, or a program of firmware/kilobot for Kilobots; a path is relative to the
+      scene file; empty: that of the run. `--brain` replaces the images of a scene in which every group has one.
     - `controller`: table A, B or aggregate, the controller transport, or a Python file or entry point
       (robots/own_controller.py); a path is relative to the scene file; empty: that of the run
-    - `id_first`: number of the first robot; the next ones count up. `{id}` in `stimulus` is replaced by it.
+    - `id_first`: number of the first robot; the next ones count up. `{id}` in `stimulus` is replaced by it. It is the
+      UID of a Kilobot.
     - `heading_deg`: heading at the start; nan: random
     - `selector`, `remote`, `stimulus`: as in [start]
     """
@@ -323,6 +365,7 @@ TABLES: Final[Mapping[str, type[Any]]] = {
     "battery": BatterySetting,
     "start": Start,
     "bluetooth": Bluetooth,
+    "kilobots": Kilobots,
     "clock": Clock,
 }
 LISTS: Final[Mapping[str, type[Any]]] = {
@@ -342,6 +385,7 @@ _PLACED: Final = {
     "depth_cm": (0, 10_000),
     "sd_cm": (0, 10_000),
     "circle_cm": (0, 10_000),
+    "spacing_cm": (0.1, 10_000),
 }
 LIMITS: Final[Mapping[type[Any], Mapping[str, tuple[float, float]]]] = {
     Arena: {"width_cm": (20, 10_000), "height_cm": (20, 10_000)},
@@ -390,6 +434,20 @@ LIMITS: Final[Mapping[type[Any], Mapping[str, tuple[float, float]]]] = {
         "remote_held_s": (0, 7),
         "silent_s": (0.1, math.inf),
     },
+    Kilobots: {
+        "speed_cm_s": (0, 10),
+        "turn_deg_s": (0, 720),
+        "motor_sd": (0, 0.2),
+        "calibration_sd": (0, 0.2),
+        "motion_noise": (0, 1),
+        "thrust_n": (0.001, math.inf),
+        "brake_n": (0.001, 10),
+        "clock_sd": (0, 0.03),
+        "reach_cm": (0, 100),
+        "lost_share": (0, 0.99),
+        "ambient_counts": (0, 1023),
+        "lamp_gain": (0, 100),
+    },
     Bluetooth: {"period_ms": (0.1, 10_000)},
     Clock: {"quantum_ms": (0.1, 20), "scripted_quantum_ms": (0.1, 20), "sample_s": (0.02, 60)},
     RobotGroup: {**_PLACED, "count": (0, 1000), "id_first": (0, 65_535), "selector": (-1, 15)},
@@ -420,4 +478,4 @@ NAMED: Final = {
 """Colours by name as a camera shows them in the experiment's light; red, green and wall are those of
 `appearance.COLOURS`. UNVERIFIED on a robot."""
 
-PLACES: Final = ("marks", "uniform", "normal", "circle", "poses")
+PLACES: Final = ("marks", "uniform", "normal", "circle", "hexagonal", "poses")

@@ -18,10 +18,13 @@ from arena.lockstep.scheduler import LockStep, RunAheadRobot
 from arena.robots.bluetooth import BluetoothLinks
 from arena.robots.controller import Controller
 from arena.scene.loader import Scene
+from arena.scene.robot_kind import KILOBOT
 from arena.world.physics import World
 
 _OBJECT: Final = ("x", "y", "heading")
 """Columns of an object; the last one for polygons."""
+TO_ALL: Final = -1
+"""Receiver of a message that a Kilobot sends to all robots in reach."""
 STOPPED: Final = (0.0, 0.0)
 """Wheel speeds of a robot at rest."""
 
@@ -153,6 +156,11 @@ def run_trial(
     return running.result
 
 
+def has_messages(scene: Scene) -> bool:
+    """Whether a record of the scene has a column of messages: it has Bluetooth links or Kilobots."""
+    return bool(scene.bluetooth.links) or any(group.kind == KILOBOT.name for group in scene.groups)
+
+
 def _lockstep_of(
     world: World, controllers: Sequence[Controller], channel: OpticalChannel | None, threads: int
 ) -> LockStep | None:
@@ -176,6 +184,7 @@ class _Recorder:
     ) -> None:
         self._on_row = on_row
         self._noted = noted
+        self._has_messages = has_messages(world.scene)
         self._links = links
         self._world = world
         self._controllers = controllers
@@ -188,16 +197,19 @@ class _Recorder:
         row: dict[str, Any] = {"t": round(world.seconds, 6)}
         for index, place in enumerate(world.object_poses()):
             row |= {f"o{index}_{name}": round(value, 4) for name, value in zip(_OBJECT, place, strict=False)}
-        log, lights = [], []
+        log, lights, messages = [], [], self._links.take_messages()
         for index, controller in enumerate(self._controllers):
             row |= self._robot_columns(index, controller, world.poses.robots[index], wheels[index])
             log += [{"robot": index, "cycle": line.cycle, "text": line.text} for line in controller.take_lines()]
+            messages += [{"robot": index, "to": TO_ALL, "cycle": message.cycle, "text": message.text}
+                         for message in controller.take_messages()]  # fmt: skip
             lights += [
                 {"robot": index, "cycle": change.cycle, "leds": change.leds}
                 for change in controller.take_led_changes()
             ]  # fmt: skip
         row["log"], row["lights"] = log, lights
-        row |= self._links.take_messages()
+        if self._has_messages:
+            row["messages"] = messages
         row |= {f"n_{name}": value for name, value in self._noted.items()}
         self.rows.add(row)
         if self._on_row is not None:

@@ -97,8 +97,11 @@ static int is_before(const struct edge *e, const struct edge *other)
     return e->at != other->at ? e->at < other->at : e->sender < other->sender;
 }
 
+// A robot that is stopped or has no power yet receives nothing.
 static void add_edge(struct air *a, struct robot *r, struct edge edge)
 {
+    if (edge.at < r->reached)
+        return;
     if (r->edge_count == EDGES) {
         a->lost_edges++;
         return;

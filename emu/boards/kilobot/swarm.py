@@ -9,7 +9,6 @@ The same robots, seed and calls give the same run, however it is cut into calls.
 
 from __future__ import annotations
 
-import math
 import struct
 from collections.abc import Callable, Sequence
 from ctypes import Structure, addressof, c_int32, c_int64, c_uint32, c_uint64, c_void_p
@@ -17,6 +16,9 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
 
 from emu.avr.core.state import declaration
 from emu.avr.image import AvrImage
@@ -47,14 +49,17 @@ EDGES: Final = 256
 ADC6, ADC7, AIN1 = 6, 7, 10
 LOSS_ONE: Final = 1 << 16
 ONE_RATE: Final = 1 << 32
+NEVER: Final = 1 << 62
+"""A tick after the end of every run."""
 
 
 class KilobotFaultError(Exception):
-    """A robot's firmware faulted. `robot` is its index."""
+    """A robot's firmware faulted. `robot` is its index, `what` the fault and its place."""
 
-    def __init__(self, robot: int, message: str) -> None:
-        super().__init__(f"robot {robot}: {message}")
+    def __init__(self, robot: int, what: str) -> None:
+        super().__init__(f"robot {robot}: {what}")
         self.robot = robot
+        self.what = what
 
 
 class _Edge(Structure):
@@ -100,6 +105,12 @@ def counts(gain_mm: float, distance_mm: float) -> int:
     return FULL_SCALE if distance_mm <= gain_mm else round(FULL_SCALE * (gain_mm / distance_mm) ** 2)
 
 
+def _microvolts_by_distance(gain_mm: float, distances: NDArray[np.float64]) -> NDArray[np.uint32]:
+    """Return `microvolts(counts(gain_mm, distance))` of many distances in mm."""
+    found = np.rint(FULL_SCALE * (gain_mm / np.maximum(distances, gain_mm)) ** 2).astype(np.int64)
+    return ((found * AREF_UV + 1023) // 1024 + (found > 0)).astype(np.uint32)
+
+
 def microvolts(count: int) -> int:
     """Return an input voltage that the converter reads as `count`, 0 to 1023."""
     return (count * AREF_UV + 1023) // 1024 + (1 if count else 0)
@@ -121,6 +132,8 @@ class KilobotSetup:
     """Whether its EEPROM has motor duties and the tables of strength by distance."""
     clock: float = 1.0
     """Frequency of its oscillator by the nominal 8 MHz."""
+    duties: tuple[int, ...] = tuple(DUTIES.values())
+    """Calibrated duties of its motors in the order of DUTIES."""
 
 
 class KilobotSwarm:
@@ -135,7 +148,8 @@ class KilobotSwarm:
         if delay < 2 * PULSE_TICKS:
             raise ValueError(f"a delay of {delay} ticks is less than {2 * PULSE_TICKS}")
         self._loss, self._reach = int(loss * LOSS_ONE), reach
-        self.places = [(robot.x, robot.y) for robot in robots]
+        self.places = np.array([(robot.x, robot.y) for robot in robots], dtype=float).reshape(-1, 2)
+        """Positions of the centres in mm; `move` and `move_all` change them."""
         self.now = 0
         """Ticks of 1/8 MHz since the start."""
         self._functions = _code()
@@ -144,7 +158,7 @@ class KilobotSwarm:
         for index, robot in enumerate(robots):
             machine = Atmega328p(robot.image, seed=seed * 1_000_003 + index, program=programs.get(robot.image.flash))
             programs.setdefault(robot.image.flash, machine.program)
-            set_up(machine, robot.number, calibrated=robot.calibrated)
+            set_up(machine, robot.number, calibrated=robot.calibrated, duties=robot.duties)
             self.robots.append(machine)
         count = len(robots)
         self._robots = (_Robot * count)(*(
@@ -152,6 +166,8 @@ class KilobotSwarm:
                    int(robot.clock * ONE_RATE), int(ONE_RATE / robot.clock), reached=int(robot.on_at * HZ))
             for machine, robot in zip(self.robots, robots, strict=True)))  # fmt: skip
         self._links = (_Link * (count * count))()
+        words = (c_uint32 * (4 * count * count)).from_buffer(self._links)
+        self._table = np.ctypeslib.as_array(words).reshape(count, count, 4) if count else None
         self._acts = (c_uint64 * count)()
         functions = native()
         self._air = _Air(
@@ -159,24 +175,36 @@ class KilobotSwarm:
             address_of(functions["avr_run"]), address_of(functions["avr_input"]), delay,
             seed * 2_654_435_761 % (1 << 63) | 1,
         )  # fmt: skip
-        for index in range(count):
-            self._look_at(index)
+        self._look_at(np.arange(count))
 
-    def _look_at(self, moved: int) -> None:
-        """Set the links between one robot and all others, both ways."""
-        count = len(self.robots)
-        for other in range(count):
-            distance = math.dist(self.places[moved], self.places[other])
-            for sender, receiver in ((moved, other), (other, moved)):
-                link = self._links[sender * count + receiver]
-                link.loss = self._loss
-                link.high_uv = microvolts(counts(HIGH_GAIN_MM, distance)) if distance <= self._reach else 0
-                link.low_uv = microvolts(counts(LOW_GAIN_MM, distance)) if distance <= self._reach else 0
+    def _look_at(self, moved: NDArray[np.intp]) -> None:
+        """Set the links between some robots and all others, both ways."""
+        if self._table is None:
+            return
+        apart = self.places[moved][:, None] - self.places[None]
+        distances = np.hypot(apart[..., 0], apart[..., 1])
+        for field, gain in enumerate((HIGH_GAIN_MM, LOW_GAIN_MM)):
+            strengths = np.where(distances <= self._reach, _microvolts_by_distance(gain, distances), 0)
+            self._table[moved, :, field] = strengths
+            self._table[:, moved, field] = strengths.T
+        self._table[moved, :, 2] = self._loss
+        self._table[:, moved, 2] = self._loss
 
     def move(self, robot: int, x: float, y: float) -> None:
         """Move a robot to a position in mm, at once."""
         self.places[robot] = (x, y)
-        self._look_at(robot)
+        self._look_at(np.array([robot]))
+
+    def move_all(self, places: NDArray[np.float64]) -> None:
+        """Move all robots to positions in mm, at once: an array of robots x 2. Robots at rest take no time."""
+        moved = np.flatnonzero((places != self.places).any(axis=1))
+        if moved.size:
+            self.places[moved] = places[moved]
+            self._look_at(moved)
+
+    def stop(self, robot: int) -> None:
+        """Stop a robot for good, as after a fault or without its battery. It sends and receives no more light."""
+        self._robots[robot].reached = NEVER
 
     def flash(self, robot: int, after_us: float, distance: float = 0.0) -> None:
         """Let one robot receive a light pulse of 9 ticks in some us, as strong as of a robot at a distance in mm."""
@@ -227,12 +255,16 @@ class KilobotSwarm:
         self.close()
 
 
-def set_up(machine: Atmega328p, number: int | None, *, calibrated: bool = True) -> None:
-    """Connect the parts of a Kilobot to a machine that was not started yet, and write its EEPROM."""
+def set_up(
+    machine: Atmega328p, number: int | None, *, calibrated: bool = True, duties: Sequence[int] = tuple(DUTIES.values())
+) -> None:
+    """Connect the parts of a Kilobot to a machine that was not started yet, and write its EEPROM.
+
+    `number` is its UID, `duties` the calibrated ones of the motors in the order of DUTIES."""
     if number is not None:
         machine.write_eeprom(NUMBER_AT, struct.pack("<H", number))
     if calibrated:
-        for address, duty in DUTIES.items():
+        for address, duty in zip(DUTIES, duties, strict=True):
             machine.write_eeprom(address, bytes([duty]))
         for address, gain in ((LOW_GAIN_AT, LOW_GAIN_MM), (HIGH_GAIN_AT, HIGH_GAIN_MM)):
             table = [counts(gain, distance) for distance in CALIBRATED_MM]
