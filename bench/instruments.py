@@ -74,9 +74,15 @@ def breakpoint_if(condition: str) -> Run:
     return run
 
 
-def watch(place: str) -> Run:
-    """Return a run with `emu.watch`, which pauses at every change."""
-    return lambda machine, cycles: sum(1 for _ in emu.watch(machine, machine.value(place).address or 0, cycles=cycles))
+def watch(place: str, pause: bool = True) -> Run:
+    """Return a run with `emu.watch`, which pauses at every change or collects the changes in Python."""
+
+    def run(machine: emu.Machine, cycles: int) -> None:
+        address = machine.value(place).address or 0
+        for _ in emu.watch(machine, address, cycles=cycles, pause=pause):
+            pass
+
+    return run
 
 
 def waveform(*names: str) -> Run:
@@ -127,9 +133,10 @@ RUNS: dict[str, tuple[Run, float]] = {
     "until a function": (lambda machine, cycles: machine.run(cycles=cycles, until=lambda: False), 0.001),
     "watch, changes every 128,000 Tcy": (watch("rare"), 1),
     "watch, changes every 500 Tcy": (watch("rounds"), 0.01),
+    "watch without pauses, every 500 Tcy": (watch("rounds", pause=False), 1),
     "vcd, changes every 128,000 Tcy": (waveform("rare", "ipl"), 1),
-    "vcd, changes every 500 Tcy": (waveform("rounds"), 0.05),
-    "trace": (trace, 0.02),
+    "vcd, changes every 500 Tcy": (waveform("rounds"), 1),
+    "trace": (trace, 0.1),
 }
 """Runs by the name of the instrument, each with its share of the simulated time."""
 
@@ -172,7 +179,7 @@ def main() -> None:
         print(json.dumps({"real time": found, "share": shares}))
         return
     for name, speed in found.items():
-        print(f"{name:34} {speed:9.3f} x real time  {shares[name]:8.4f}")
+        print(f"{name:36} {speed:9.3f} x real time  {shares[name]:8.4f}")
 
 
 if __name__ == "__main__":

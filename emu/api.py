@@ -29,10 +29,9 @@ import re
 import subprocess
 import sys
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from emu.boards import board_named
 from emu.chips import chip_named
@@ -48,7 +47,7 @@ from emu.system.events import NEVER
 if TYPE_CHECKING:
     from emu.debug.inspector import Frame, Inspector, Value
     from emu.debug.threads import Thread
-    from emu.dspic30f.change_log import Change as LoggedChange
+    from emu.dspic30f.change_log import Entries
 
 
 class Machine(BareMachine):
@@ -275,8 +274,7 @@ class BuildError(RuntimeError):
     """A program cannot be compiled or linked. The text consists of the compiler's messages."""
 
 
-@dataclass(frozen=True, slots=True)
-class Change:
+class Change(NamedTuple):
     """Change of a watched value. The instruction that ended before `cycle` made it; `pc` is the next instruction.
 
     >>> import emu
@@ -291,11 +289,19 @@ class Change:
     new: int
 
 
-def watch(machine: BareMachine, place: str | int, *, size: int = 2, cycles: int | None = None) -> Iterator[Change]:
+WATCH_CYCLES = 1_000_000
+"""Maximum length in Tcy of a run between two deliveries of the changes that were logged without a pause."""
+
+
+def watch(
+    machine: BareMachine, place: str | int, *, size: int = 2, cycles: int | None = None, pause: bool = True
+) -> Iterator[Change]:
     """Run `machine` and yield every change of a variable, register or data address (`size` 1 or 2 bytes).
 
-    The machine is paused at each change that the iterator yields. Native code observes RAM; for a register, the machine
-    makes single steps. The iterator ends with the run, after at most `cycles` Tcy. Raises KeyError for an unknown name.
+    The machine is paused at each change that the iterator yields. Without `pause` it runs ahead, by at most
+    WATCH_CYCLES Tcy, which is much faster if the value changes often. Native code observes RAM; for a register, the
+    machine makes single steps and is always paused. The iterator ends with the run, after at most `cycles` Tcy.
+    Raises KeyError for an unknown name.
     """
     from emu.dspic30f.change_log import WatchedNumber
     from emu.instruments.changes import is_in_ram, log_changes
@@ -304,35 +310,35 @@ def watch(machine: BareMachine, place: str | int, *, size: int = 2, cycles: int 
     changes: list[Change] = []
     value, is_running = machine.peek(address, size), False
 
-    def add(cycle: int, pc: int, now: int) -> None:
-        nonlocal value
-        changes.append(Change(cycle, pc, value, now))
-        value = now
-
     def changed() -> bool:
-        now = machine.peek(address, size)
-        if now != value:
-            add(machine.cycle, machine.pc, now)
+        nonlocal value
+        old, value = value, machine.peek(address, size)
+        if value != old:
+            changes.append(Change(machine.cycle, machine.pc, old, value))
         return bool(changes)
 
-    def log(found: list[LoggedChange]) -> None:
-        for one in found:
-            add(one.cycle, one.pc, one.value)
-        if is_running:
+    def log(found: Entries) -> None:
+        nonlocal value
+        values = found["value"].tolist()
+        changes.extend(map(Change, found["cycle"].tolist(), found["pc"].tolist(), [value, *values], values))
+        value = values[-1]
+        if is_running and pause:
             machine.interrupt()
 
     end = NEVER if cycles is None else machine.cycle + cycles
     is_logged = is_in_ram(machine, address, size)
-    end_log = log_changes(machine, [WatchedNumber(address, size)], log, ()) if is_logged else None
+    leaves = () if pause else None
+    end_log = log_changes(machine, [WatchedNumber(address, size)], log, leaves) if is_logged else None
     try:
         while machine.cycle < end:
+            limit = end if pause else min(end, machine.cycle + WATCH_CYCLES)
             is_running = True
-            stop = machine.advance(end) if is_logged else machine.step_until(changed, end)
+            stop = machine.advance(limit) if is_logged else machine.step_until(changed, end)
             is_running = False
-            is_changed = bool(changes)
+            is_paused = bool(changes) if pause or not is_logged else stop is None
             yield from changes
             changes.clear()
-            if not is_changed or (stop is not None and stop.reason not in ("until", "interrupted")):
+            if not is_paused or (stop is not None and stop.reason not in ("until", "interrupted")):
                 return
     finally:
         if end_log is not None:

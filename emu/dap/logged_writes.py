@@ -11,7 +11,7 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 from emu.dap.breakpoints import Breakpoint
-from emu.dspic30f.change_log import BOUNDARY, Change, WatchedNumber
+from emu.dspic30f.change_log import BOUNDARY, Change, Entries, WatchedNumber, changes_in
 from emu.instruments.changes import is_in_ram, log_changes
 
 if TYPE_CHECKING:
@@ -31,8 +31,8 @@ def logged_writes(machine: Machine, breakpoints: Sequence[Breakpoint]) -> Iterat
     """
     writes: list[Change] = []
 
-    def add(found: list[Change]) -> None:
-        writes.extend(found)
+    def add(found: Entries) -> None:
+        writes.extend(changes_in(found))
         machine.interrupt()
 
     watched = [WatchedNumber(one.addresses[0], one.size) for one in breakpoints]

@@ -13,7 +13,11 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any, Final, Literal, NamedTuple
 
+import numpy as np
+import numpy.typing as npt
+
 from emu.dspic30f.core import Core
+from emu.dspic30f.engines import ONE_INSTRUMENT
 from emu.dspic30f.state.state import RUN
 from emu.system.filters import Filter
 
@@ -22,9 +26,9 @@ COUNT, SEEN = 0, 1
 ENTRY_WORDS: Final = 4
 """Words of an entry: cycle; program address after the change and, in the upper half, of its instruction; index of the
 watched number; value."""
-ROOM: Final = 1024
+ENTRY: Final = np.dtype([("cycle", "<u8"), ("pc", "<u4"), ("site", "<u4"), ("number", "<u8"), ("value", "<u8")])
+ROOM: Final = 4096
 """Number of entries after which native code returns, so that the consumer is called."""
-ONE_INSTRUMENT: Final = "one instrument at a time: a profile, coverage, watched numbers or a trace"
 BOUNDARY: Final = 0xFFFFFF
 """Address of the instruction for a change that a boundary makes, for example by the entry of an interrupt."""
 
@@ -61,9 +65,19 @@ class Change(NamedTuple):
     value: int
 
 
-class ChangeLog:
-    """Logs the changes of `watched` between `start` and `stop` to `consumer`, which receives lists of changes.
+Entries = npt.NDArray[np.void]
+"""Changes as an array of ENTRY."""
 
+
+def changes_in(entries: Entries) -> list[Change]:
+    """Return logged entries as a list of changes."""
+    return list(map(Change._make, entries.tolist()))
+
+
+class ChangeLog:
+    """Logs the changes of `watched` between `start` and `stop` to `consumer`.
+
+    The consumer receives arrays of entries, which are valid until it returns.
     `leaves` says when native code returns so that the consumer sees a change at once: None means only for a full log,
     () at each change, a filter at changes after which it holds. Its comparisons may name fixed RAM addresses only.
     With `every_write`, a store to a watched number is logged even if it leaves the value unchanged.
@@ -73,7 +87,7 @@ class ChangeLog:
         self,
         core: Core,
         watched: Sequence[Watched],
-        consumer: Callable[[list[Change]], object],
+        consumer: Callable[[Entries], object],
         leaves: Filter | None = None,
         every_write: bool = False,
     ) -> None:
@@ -87,6 +101,7 @@ class ChangeLog:
         self.first: Final = SEEN + len(self.watched)
         """Word of the first entry."""
         self._words: Final = (ctypes.c_uint64 * (self.first + ENTRY_WORDS * (ROOM + 2 * len(self.watched))))()
+        self._entries: Final[Entries] = np.frombuffer(memoryview(self._words).cast("B"), ENTRY, offset=8 * self.first)
         self.address: Final = ctypes.addressof(self._words)
         """Host address of the log."""
         self._getters: Final = [_getter(core, one) for one in self.watched]
@@ -144,10 +159,7 @@ class ChangeLog:
         self._words[COUNT] = 0
         if self._is_stale:
             return
-        end = self.first + ENTRY_WORDS * count
-        rows = zip(*(self._words[self.first + word : end : ENTRY_WORDS] for word in range(ENTRY_WORDS)), strict=True)
-        self._consumer([Change(cycle, where & 0xFFFFFFFF, where >> 32, index, value)
-                        for cycle, where, index, value in rows])  # fmt: skip
+        self._consumer(self._entries[:count])
 
     def _after_instruction(self, execute: Callable[[], None]) -> Callable[[], None]:
         state = self._core.state

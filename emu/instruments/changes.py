@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
-from emu.dspic30f.change_log import Change, ChangeLog, Watched
+from emu.dspic30f.change_log import ChangeLog, Entries, Watched
 
 if TYPE_CHECKING:
     from emu.machine.machine import Machine
@@ -21,13 +21,13 @@ def is_in_ram(machine: Machine, address: int, size: int) -> bool:
 def log_changes(
     machine: Machine,
     watched: Sequence[Watched],
-    consumer: Callable[[list[Change]], object],
+    consumer: Callable[[Entries], object],
     leaves: Filter | None = None,
     every_write: bool = False,
 ) -> Callable[[], None]:
     """Log the changes of `watched` to `consumer` while `machine` runs. Return the function that ends it.
 
-    `leaves` and `every_write` are as for `ChangeLog`. Raises ValueError if another instrument runs.
+    `consumer`, `leaves` and `every_write` are as for `ChangeLog`. Raises ValueError if another instrument runs.
     """
     log = ChangeLog(machine.core, watched, consumer, leaves, every_write)
     if machine.engine == "plain":

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from emu.debug.dwarf.location import Unavailable
 from emu.debug.expressions.expression import ExpressionError, evaluate, number_of
 from emu.debug.expressions.filters import filter_of
-from emu.dspic30f.change_log import Change, WatchedNumber
+from emu.dspic30f.change_log import Entries, WatchedNumber
 from emu.instruments.changes import is_in_ram, log_changes
 
 if TYPE_CHECKING:
@@ -67,7 +67,7 @@ def _run_until_change(machine: Machine, filter_: Filter, holds: Callable[[], boo
     """Run to the first change after which a condition on variables holds, at most to cycle `limit`."""
     is_met = False
 
-    def look(_changes: list[Change]) -> None:
+    def look(_changes: Entries) -> None:
         nonlocal is_met
         if not is_met and holds():
             is_met = True

@@ -1,30 +1,30 @@
-"""Waveforms of a run as a VCD file, for GTKWave and similar viewers, written by pyvcd.
+"""Waveforms of a run as a VCD file, for GTKWave and similar viewers.
 
 Input: a machine, a stream, names to watch. Output: changes of pins and bytes of UARTs. If watched, also the CPU's
 priority, sleep, the running OpenSwarm thread and variables. Native code logs them, but for a watched register the
-machine makes single steps. Each time is computed from the cycle and the initial clock, rounded to 1 ps, so rounding
-errors do not accumulate.
+machine makes single steps.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from fractions import Fraction
 from functools import partial
-from typing import TYPE_CHECKING, Any, Final, TextIO
+from typing import TYPE_CHECKING, Final, TextIO
+
+import numpy as np
 
 from emu.debug import symbolic
 from emu.debug.inspector import Inspector
 from emu.debug.threads import RUNNING
-from emu.dspic30f.change_log import Change, Watched, WatchedNumber
+from emu.dspic30f.change_log import Entries, Watched, WatchedNumber
 from emu.instruments.changes import is_in_ram, log_changes
+from emu.instruments.vcd_file import VcdFile
 from emu.peripherals.pins import PORTS, parse_pin
 
 if TYPE_CHECKING:
     from emu.machine.machine import Machine
     from emu.machine.stops import Stop
 
-PICOSECONDS: Final = 10**12
 FLUSH_CYCLES: Final = 1_000_000
 """Maximum length of a run between two writes of the collected changes, in Tcy."""
 CPU: Final = ("ipl", "asleep", "thread")
@@ -46,45 +46,36 @@ class WaveformRecorder:
         advance: Callable[[int], Stop | None] | None = None,
         again: bool = False,
     ) -> None:
-        from vcd import VCDWriter
-
         self._machine: Final = machine
         self._advance: Final = advance or machine.advance
-        self._hz: Final = machine.hz
-        self._writer: Final[Any] = VCDWriter(
-            stream, timescale="1 ps", date="", version="emu", init_timestamp=self._time(machine.cycle)
-        )
-        self._has_failed = False
-        """Whether a write has failed, for example on a full disk: the writer's state is then inconsistent."""
+        self._file: Final = VcdFile(stream, machine.hz, machine.cycle)
         pins = machine.pins
         self._edges: list[tuple[int, int, int]] = []
         self._frames: list[tuple[int, int, int, int, int, int]] = []
-        self._pending: list[tuple[int, Any, Any]] = []
-        """Changes by cycle that are not yet written. A UART frame is known before its last bit has been sent."""
+        """Edges and UART frames that are not yet in the file. A frame is known before its last bit has been sent."""
         self._transmit: Final = [0] * len(PORTS)
         for uart in machine.uart.values():
             port, mask = parse_pin(uart.site.tx_pin)
             self._transmit[port] |= mask
         self._levels: Final = pins.level.tolist()
         self._pins: Final = self._register_pins()
-        self._bytes: Final[dict[int, list[Any]]] = {}
+        self._bytes: Final[dict[int, tuple[int, int]]] = {}
+        """Variables of each UART: its last byte, and the number of bytes."""
+        self._sent: Final = dict.fromkeys(machine.uart, 0)
         self._removals: Final[list[Callable[[], None]]] = []
         for number, uart in machine.uart.items():
             scope = f"uart{number}"
-            data = self._writer.register_var(scope, "tx", "reg", size=8, init=0)
-            count = self._writer.register_var(scope, "tx_count", "integer", size=32, init=0)
-            self._bytes[number] = [data, count, 0]
-            self._removals.append(uart.listen(partial(self._sent, number), part=again))
+            data = self._file.register(scope, "tx", "reg", 8)
+            self._bytes[number] = data, self._file.register(scope, "tx_count", "integer", 32)
+            self._removals.append(uart.listen(partial(self._add_byte, number), part=again))
         found = [self._watch(name) for name in watch]
-        self._seen: Final = [get() for _, get, _ in found]
-        for (variable, _, _), value in zip(found, self._seen, strict=True):
-            self._writer.change(variable, self._time(machine.cycle), value)
-        self._variables: Final = [variable for variable, _, _ in found]
+        self._variables: Final = np.array([variable for variable, _, _ in found], dtype=np.uint64)
         logged = [one for _, _, one in found if one is not None]
-        self._sampled: Final = [] if len(logged) == len(found) else [get for _, get, _ in found]
-        """Functions that read the watched values after each step, if native code cannot log them all."""
+        self._sampled: Final = [] if len(logged) == len(found) else [(variable, get) for variable, get, _ in found]
+        """Variables and functions that read them after each step, if native code cannot log all values."""
+        self._seen: Final = {variable: get() for variable, get in self._sampled}
         if logged and not self._sampled:
-            self._removals.append(log_changes(machine, logged, self._changed))
+            self._removals.append(log_changes(machine, logged, self._add_logged))
         pins.edges, pins.frames = self._edges, self._frames
         self._logged = machine.cycle
         """Cycle up to which the edges of waveforms are in the log."""
@@ -93,11 +84,8 @@ class WaveformRecorder:
         self._waveform_pins = pins.waveform_pins.tolist()
         self._removals.append(pins.on_waveform_change(self._log_waveforms, self._log_detached))
 
-    def _time(self, cycle: int) -> int:
-        return round(Fraction(cycle * PICOSECONDS) / self._hz)
-
-    def _register_pins(self) -> dict[tuple[int, int], Any]:
-        machine, found = self._machine, {}
+    def _register_pins(self) -> dict[tuple[int, int], int]:
+        machine, found = self._machine, dict[tuple[int, int], int]()
         names = _board_names(machine)
         for port, letter in enumerate(PORTS):
             sfr = machine.chip.sfrs.get(f"LAT{letter}")
@@ -106,29 +94,32 @@ class WaveformRecorder:
                     name = f"R{letter}{bit}"
                     level = 1 if self._transmit[port] >> bit & 1 else self._levels[port] >> bit & 1
                     full = f"{name}_{names[name]}" if name in names else name
-                    found[port, bit] = self._writer.register_var("pins", full, "wire", size=1, init=level)
+                    found[port, bit] = self._file.register("pins", full, "wire", 1, level)
         return found
 
-    def _watch(self, name: str) -> tuple[Any, Callable[[], Any], Watched | None]:
-        """Return the VCD variable for a watched name, a function that reads its value, and its entry in a log.
+    def _watch(self, name: str) -> tuple[int, Callable[[], int], Watched | None]:
+        """Return the variable in the file for a watched name, a function that reads its value, and its entry in a log.
 
         The entry is None for a value that is not in RAM.
         """
         machine, state = self._machine, self._machine.state
+        scope, kind = "cpu", "reg"
+        get: Callable[[], int]
+        logged: Watched | None
         if name == "ipl":
-            return self._writer.register_var("cpu", name, "reg", size=4, init=0), lambda: state.ipl, "ipl"
-        if name == "asleep":
-            variable = self._writer.register_var("cpu", name, "wire", size=1, init=0)
-            return variable, lambda: int(machine.is_asleep), "asleep"
-        if name == "thread":
-            return (self._writer.register_var("cpu", name, "integer", size=16, init=0), *self._thread())
-        value = symbolic.variable(Inspector(machine), name)
-        address, size = value.address, value.type.bytes
-        if address is None or not value.type.is_number or value.bits is not None:
-            raise ValueError(f"{name!r} is not a variable in memory with a numeric type")
-        variable = self._writer.register_var("variables", name.replace(" ", ""), "reg", size=8 * size, init=0)
-        logged = WatchedNumber(address, size) if is_in_ram(machine, address, size) else None
-        return variable, lambda: machine.peek(address, size), logged
+            size, get, logged = 4, lambda: state.ipl, "ipl"
+        elif name == "asleep":
+            kind, size, get, logged = "wire", 1, lambda: int(machine.is_asleep), "asleep"
+        elif name == "thread":
+            kind, size, (get, logged) = "integer", 16, self._thread()
+        else:
+            value = symbolic.variable(Inspector(machine), name)
+            address, length = value.address, value.type.bytes
+            if address is None or not value.type.is_number or value.bits is not None:
+                raise ValueError(f"{name!r} is not a variable in memory with a numeric type")
+            scope, size, get = "variables", 8 * length, lambda: machine.peek(address, length)
+            logged = WatchedNumber(address, length) if is_in_ram(machine, address, length) else None
+        return self._file.register(scope, name.replace(" ", ""), kind, size, get()), get, logged
 
     def _thread(self) -> tuple[Callable[[], int], WatchedNumber]:
         """Return a function that reads the PID of the running thread, and the PID's entry in a log."""
@@ -146,15 +137,15 @@ class WaveformRecorder:
 
         return number, WatchedNumber(place, 2, pid.offset)
 
-    def _changed(self, changes: list[Change]) -> None:
+    def _add_logged(self, changes: Entries) -> None:
         """Collect logged changes."""
-        self._pending += [(one.cycle, self._variables[one.number], one.value) for one in changes]
+        self._file.add_all(changes["cycle"], self._variables[changes["number"].astype(np.int64)], changes["value"])
 
-    def _sent(self, number: int, byte: int, _start: int) -> None:
-        data, count, sent = self._bytes[number]
-        now = self._machine.events.now
-        self._bytes[number][2] = sent + 1
-        self._pending += [(now, data, byte & 0xFF), (now, count, sent + 1)]
+    def _add_byte(self, number: int, byte: int, _start: int) -> None:
+        now, (data, count) = self._machine.events.now, self._bytes[number]
+        self._sent[number] += 1
+        self._file.add(now, data, byte & 0xFF)
+        self._file.add(now, count, self._sent[number])
 
     # Running
 
@@ -163,7 +154,7 @@ class WaveformRecorder:
         machine, stop = self._machine, None
         while stop is None and machine.cycle < cycle:
             stop = self._step(cycle) if self._sampled else self._advance(min(cycle, machine.cycle + FLUSH_CYCLES))
-            if not self._sampled or len(self._edges) + len(self._pending) > 1000 or machine.cycle >= cycle or stop:
+            if not self._sampled or len(self._edges) + self._file.pending > 1000 or machine.cycle >= cycle or stop:
                 machine.pins.flush()
                 self._write(machine.cycle)
         return stop
@@ -179,11 +170,11 @@ class WaveformRecorder:
 
     def _sample(self) -> None:
         now = self._machine.cycle
-        for index, get in enumerate(self._sampled):
+        for variable, get in self._sampled:
             value = get()
-            if value != self._seen[index]:
-                self._seen[index] = value
-                self._pending.append((now, self._variables[index], value))
+            if value != self._seen[variable]:
+                self._seen[variable] = value
+                self._file.add(now, variable, value)
 
     def _log_waveforms(self, until: int) -> None:
         """Log the edges of waveforms up to cycle `until`."""
@@ -209,37 +200,27 @@ class WaveformRecorder:
             self._levels[port] = levels
             for bit in range(16):
                 if changed >> bit & 1 and (port, bit) in self._pins:
-                    self._pending.append((cycle, self._pins[port, bit], levels >> bit & 1))
+                    self._file.add(cycle, self._pins[port, bit], levels >> bit & 1)
         for start, port, mask, bits, length, width in self._frames:
             variable = self._pins.get((port, mask.bit_length() - 1))
-            for index in range(length if variable is not None else 0):
-                self._pending.append((start + index * width, variable, bits >> index & 1))
+            if variable is not None:
+                for index in range(length):
+                    self._file.add(start + index * width, variable, bits >> index & 1)
         self._edges.clear()
         self._frames.clear()
-        self._pending.sort(key=lambda change: change[0])
-        ready = 0
-        try:
-            for cycle, variable, value in self._pending:
-                if cycle > until:
-                    break
-                self._writer.change(variable, self._time(cycle), value)
-                ready += 1
-        except OSError:
-            self._has_failed = True
-            raise
-        del self._pending[:ready]
+        self._file.write(until)
 
     def close(self) -> None:
         """Write the remaining changes and close the file. After a failed write, only stop recording. Raises OSError."""
         machine = self._machine
         for remove in self._removals:
             remove()
-        if not self._has_failed:
-            machine.pins.flush()
+        machine.pins.flush()
+        try:
             self._write(machine.cycle)
-        machine.pins.edges = machine.pins.frames = None
-        if not self._has_failed:
-            self._writer.close(self._time(machine.cycle))
+            self._file.close(machine.cycle)
+        finally:
+            machine.pins.edges = machine.pins.frames = None
 
 
 def _board_names(machine: Machine) -> dict[str, str]:

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 import emu
-from emu.dspic30f.change_log import Change, Watched, WatchedNumber
+from emu.dspic30f.change_log import ROOM, Change, Watched, WatchedNumber, changes_in
 from emu.dspic30f.jit.engine import JitEngine
 from emu.instruments.changes import log_changes
 from emu.instruments.vcd import WaveformRecorder
@@ -109,7 +109,7 @@ def read(machine: Machine, one: Watched) -> int:
 def logged(machine: Machine, watched: list[Watched], advance: Callable[[], object]) -> list[Change]:
     """Return the changes of a run as the log has them, without the address of the instruction."""
     found: list[Change] = []
-    stop = log_changes(machine, watched, found.extend)
+    stop = log_changes(machine, watched, lambda entries: found.extend(changes_in(entries)))
     advance()
     stop()
     return [one._replace(site=0) for one in found]
@@ -158,14 +158,14 @@ def test_random_firmware(seed: int) -> None:
 
 def test_more_changes_than_the_log_holds(path: Path) -> None:
     """Native code returns when the log is full, and no change is lost."""
-    machine, other = machine_of(path, "jit"), machine_of(path, "plain")
+    machine, other = machine_of(path, "jit"), machine_of(path, "jit")
     for one in (machine, other):
         one.run(until="main")
     address = machine.value("text").address or 0
     watched: list[Watched] = [WatchedNumber(address + 2 * n, 2) for n in range(12)]
-    found = logged(machine, watched, lambda: machine.advance(90_000))
-    assert len(found) > 2_000
-    assert found == logged(other, watched, lambda: other.advance(90_000))
+    found = logged(machine, watched, lambda: machine.advance(300_000))
+    assert len(found) > 2 * ROOM
+    assert found == logged(other, watched, lambda: slices(other, 300_000, 2_000))
 
 
 def waveform(machine: emu.Machine, names: list[str], cycles: int) -> str:
@@ -201,6 +201,18 @@ def test_the_machine_is_paused_at_every_change(path: Path, place: str) -> None:
     assert len(found) > 2
     assert all((one.cycle, one.pc) == (cycle, pc) for one, cycle, pc in found)
     assert found == changes_of(machine_of(path, "plain"), place, 9_000)
+
+
+@pytest.mark.parametrize("engine", ["plain", "jit"])
+def test_a_watch_without_pauses_yields_the_same_changes(
+    path: Path, engine: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(emu.api, "WATCH_CYCLES", 1_000)
+    machine = machine_of(path, engine)
+    found = list(emu.watch(machine, "ticks", cycles=9_000, pause=False))
+    assert len(found) > 9
+    assert found == [one for one, _, _ in changes_of(machine_of(path, "jit"), "ticks", 9_000)]
+    assert machine.cycle >= 9_000
 
 
 CONDITIONS = ("rare == 2", "ticks >= 5 && letter > 2", "total > 100", "!running && ticks == 4", "letter != 0",
