@@ -16,6 +16,7 @@ from xml.etree import ElementTree
 
 import jsonschema
 import pytest
+from PIL import Image
 
 from arena.commands import debug as arena_debug
 from openswarm.cli import main
@@ -76,6 +77,31 @@ def test_it_is_of_this_version_and_licence() -> None:
     assert (EXTENSION["version"], EXTENSION["license"]) == (project["version"], project["license"])
     assert (FOLDER / "LICENSE").read_bytes() == (ROOT / "LICENSE").read_bytes()
     assert f"openswarm-{EXTENSION['version']}.vsix" in (FOLDER / "README.md").read_text(encoding="utf-8")
+
+
+def test_the_icon_is_a_square_picture() -> None:
+    """The icon is a PNG of at least 128 x 128 pixels, which the Marketplace requires."""
+    with Image.open(FOLDER / EXTENSION["icon"]) as icon:
+        assert icon.format == "PNG"
+        assert icon.width == icon.height >= 128
+
+
+def test_the_walkthrough_matches_the_extension() -> None:
+    """Every page of the walkthrough exists and is used; its commands, settings and launch configuration are valid."""
+    steps = EXTENSION["contributes"]["walkthroughs"][0]["steps"]
+    pages = [FOLDER / step["media"]["markdown"] for step in steps]
+    assert sorted(pages) == sorted(FOLDER.glob("walkthrough/*.md"))
+    text = json.dumps(steps)
+    own = {one["command"] for one in EXTENSION["contributes"]["commands"]}
+    assert set(re.findall(r"(?:command|onCommand):(openswarm\.\w+)", text)) <= own
+    settings = {*EXTENSION["contributes"]["configuration"]["properties"]}
+    assert set(re.findall(r"onSettingChanged:([\w.]+)", text)) <= settings
+    titles = {f"*OpenSwarm: {one['title']}*" for one in EXTENSION["contributes"]["commands"]}
+    named = set(re.findall(r"\*OpenSwarm: [^*]+\*", "".join(page.read_text(encoding="utf-8") for page in pages)))
+    assert named
+    assert named <= titles
+    (block,) = re.findall(r"```json\n(\{.*?)```", (FOLDER / "walkthrough/swarm.md").read_text(encoding="utf-8"), re.S)
+    validate(json.loads(block))
 
 
 @pytest.mark.skipif(shutil.which("node") is None, reason="no node here (Debian package nodejs)")
@@ -204,7 +230,8 @@ def test_it_is_packaged(tmp_path: Path) -> None:
         names = set(package.namelist())
         manifest = ElementTree.fromstring(package.read("extension.vsixmanifest"))
         inner = json.loads(package.read("extension/package.json"))
-    wanted = {"package.json", "extension.js", "readme.md", "LICENSE.txt"}
+    wanted = {"package.json", "extension.js", "readme.md", "LICENSE.txt", "icon.png"}
+    wanted |= {f"walkthrough/{page.name}" for page in FOLDER.glob("walkthrough/*.md")}
     assert names == {"extension.vsixmanifest", "[Content_Types].xml", *(f"extension/{name}" for name in wanted)}
     identity = manifest.find(".//{*}Identity")
     assert identity is not None
