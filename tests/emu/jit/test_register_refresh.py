@@ -10,7 +10,9 @@ from random_firmware import difference
 
 from emu.boards.epuck.board import Epuck
 from emu.dspic30f.isa.text import parse
+from emu.dspic30f.jit.environment import REFRESHED
 from emu.machine.machine import Machine
+from emu.system.native_handle import FRESH_ROOM
 
 LOOP = 0x200
 CYCLES = 160_000
@@ -93,3 +95,11 @@ def test_engines_render_the_same_lines_and_leave_the_same_state(program: str, in
         assert not difference(machines["plain"], machines["jit"])
     assert lines["plain"] == lines["jit"]
     assert bool(lines["plain"]) == rendered
+
+
+def test_the_list_of_refreshed_instructions_ends_with_zero() -> None:
+    """More instructions than the list holds, and one twice: the host program that reads the list finds its end."""
+    runner = machine("jit", "nop", []).runner
+    for address in (2, *range(2, 8 * FRESH_ROOM, 2)):
+        runner._remember_refresh(address)
+    assert list(runner._env[REFRESHED : REFRESHED + FRESH_ROOM]) == [*range(2, 2 * FRESH_ROOM, 2), 0]

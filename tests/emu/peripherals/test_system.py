@@ -276,11 +276,13 @@ def test_module_switches_follow_a_restored_snapshot(rig):
 
 
 def test_pwrsav_sets_the_status_bit_of_its_mode(rig):
-    """§4, §17: PWRSAV sets the status bit IDLE or SLEEP of its mode."""
+    """§4, §17: PWRSAV sets the status bit IDLE or SLEEP of its mode. RCON has no clock that stops meanwhile."""
     rig.at(10).dev.sleep(1, 10)
     rig.at(20).dev.wake(20)
     assert (rig.field("RCON", "IDLE"), rig.field("RCON", "SLEEP")) == (1, 0)
     rig.at(30).dev.sleep(2, 30)
+    assert rig.dev.timer[1].is_frozen
+    assert not rig.dev.resets.is_frozen
     rig.at(40).dev.wake(40)
     assert (rig.field("RCON", "IDLE"), rig.field("RCON", "SLEEP")) == (1, 1)
 
