@@ -70,6 +70,8 @@ class MachineLayout:
     flow: flow_rules.FlowOperands
     rules: Mapping[int, Rule] = field(default_factory=dict)
     """Rules of device registers, by even data address."""
+    tapped: tuple[int, ...] = ()
+    """Even addresses of SFRs whose reads and writes an observer receives. Only Python accesses them."""
     hooks: frozenset[int] = frozenset()
     """Hooked program addresses, before which native code returns to Python."""
     filters: Mapping[int, tuple[Filter, ...]] = field(default_factory=dict)
@@ -143,6 +145,7 @@ def machine_layout(
         latches=latch_layout(core),
         flow=flow_rules.operands_of(core.state),
         rules={2 * word: rule for word, rule in enumerate(bus.rules) if rule is not None},
+        tapped=tuple(2 * word for word in sorted(bus.watched)),
         hooks=hooks,
         filters=filters or {},
         do_start=start,

@@ -137,6 +137,21 @@ def test_register_hooks_are_many_and_can_be_removed(load, engine):
         machine.hook_sfr("counter", lambda _write, _word: None)
 
 
+@pytest.mark.parametrize("name", ["SR", "ACCAL", "ACCAU", "RCOUNT", "CORCON"])
+def test_a_register_hook_hears_reads_of_the_core_registers_in_native_code(load, name):
+    """Native code keeps some of them in variables."""
+    heard = {}
+    for engine in ("plain", "jit"):
+        machine = load(SPIN.replace("mov w0, 0x800", f"mov {{{name}}}, w1"), engine=engine, board=None)
+        if engine == "jit":
+            machine.runner.wait, machine.runner.threshold = True, 1
+        calls = heard[engine] = []
+        machine.hook_sfr(name, lambda *access, calls=calls: calls.append(access))
+        machine.run(cycles=2000)
+    assert len(heard["plain"]) > 50
+    assert heard["plain"] == heard["jit"]
+
+
 def test_times_are_seconds_or_cycles(load):
     machine = load(SPIN)
     stop = machine.run(seconds=0.001)

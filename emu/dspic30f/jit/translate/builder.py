@@ -297,6 +297,8 @@ class LlvmBuilder:
         layout = self.layout
         if address < W_END:
             return LlvmBuilder._static_w
+        if address in layout.tapped:
+            raise NeedsInterpreter
         if address == layout.offset["SR"]:
             return LlvmBuilder._static_sr
         if self.repeating is not None:
