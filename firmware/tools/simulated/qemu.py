@@ -219,6 +219,14 @@ class Qemu:
             self._ask(f"z0,{address:x},2")
         return self.pc
 
+    def run_to_end(self) -> int:
+        """Run until the program ends QEMU and return its exit status. Raises Stopped."""
+        self._socket.sendall(b"$c#63")
+        try:
+            return self._process.wait(PATIENCE)
+        except subprocess.TimeoutExpired:
+            raise Stopped(f"QEMU still runs after {PATIENCE:g} s") from None
+
     def peek_bytes(self, address: int, count: int) -> bytes:
         sizes = [min(MOST_BYTES, count - done) for done in range(0, count, MOST_BYTES)]
         places = range(address, address + count, MOST_BYTES)

@@ -97,6 +97,46 @@ def last_words(target: str, image: Path) -> bytes:
     return machine.uart()
 
 
+WITHOUT_A_SWITCH = r"""
+#include <openswarm.h>
+static volatile uint8 sum;
+static void greedy(void)
+{
+    volatile uint8 room[SYS_DEFAULT_STACK];
+    for (uint16 i = 0; i < sizeof room; i++) {
+        room[i] = 1;
+    }
+    sum += room[0];
+}
+static void modest(void)
+{
+    for (;;) {
+        Sys_Sleep(1);
+    }
+}
+int main(void)
+{
+    Sys_Init_Kernel();
+    Sys_Start_Process(greedy);
+    Sys_Start_Process(modest);
+    Sys_Start_Kernel();
+    Sys_Run_SystemThread();
+    return 0;
+}
+"""
+
+
+def test_a_thread_that_ends_after_an_overflow_is_reported(tmp_path: Path) -> None:
+    """The RISC-V detects an overflow at the end of a thread that no switch has checked (port/riscv/README.md).
+
+    The overflow damages the control block of the next thread.
+    """
+    (tmp_path / "ending").mkdir()
+    (tmp_path / "ending" / "main.c").write_text(WITHOUT_A_SWITCH)
+    image = make("qemu_virt", "ending", tmp_path / "out", apps=tmp_path)
+    assert last_words("qemu_virt", image) == b"stack trap at 0x0:0 in thread 1\r\n"
+
+
 IN_A_HANDLER = r"""
 #include <openswarm.h>
 static volatile uint8 sum;

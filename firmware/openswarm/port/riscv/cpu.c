@@ -105,5 +105,10 @@ HAL_OUTLINE void hal_stop(void)
 HAL_USED HAL_NORETURN void cpu_fault(uint32_t cause, uint32_t pc)
 {
     enum { ADDRESS = 1, INTERRUPT = 3, IS_INTERRUPT = 31 };
+    static bool reporting;
+    if (reporting) { /* a fault of the report itself */
+        hal_stop();
+    }
+    reporting = true;
     os_trap(cause >> IS_INTERRUPT ? INTERRUPT : ADDRESS, (uint16)pc, (uint16)(pc >> 16));
 }

@@ -35,6 +35,15 @@
         \operation a7, 60(sp)
         .endm
 
+# The end of an interrupt: withdraws the reservation of an LR that it came behind, because a store of the same hart may
+# leave it. Should this SC succeed, it stores what is there.
+        .macro  return_from_interrupt
+        each_scratch lw
+        sc.w    zero, ra, (sp)
+        addi    sp, sp, 64
+        mret
+        .endm
+
         .macro  each_saved operation
         \operation s0, 0(sp)
         \operation s1, 4(sp)
@@ -81,9 +90,7 @@
         li      t0, MSTATUS_RESUME
         csrs    mstatus, t0
         csrsi   mie, MIE_MSIE
-        each_scratch lw
-        addi    sp, sp, 64
-        mret
+        return_from_interrupt
         end     resume_preempted
 
 # ---- void hal_block(void): thread stack, level slice ------------------------------------------------------------------
@@ -109,6 +116,7 @@
         sw      sp, 0(a0)
         lw      t1, PCB_LIMIT(a0)
         bltu    sp, t1, overflow        # below the stack now, or was its last word written before?
+check_paint:
         lw      t0, 0(t1)
         li      t1, PAINT
         bne     t0, t1, overflow
@@ -133,7 +141,10 @@ to_kernel:
 # ---- void hal_abandon(hal_pick): any stack, level slice ---------------------------------------------------------------
         code    hal_abandon
         mv      t2, a0
-        j       to_kernel
+        la      t0, os_running
+        lw      a0, 0(t0)
+        lw      t1, PCB_LIMIT(a0)
+        j       check_paint             # a thread that ends without a switch may have overflowed its stack, too
         end     hal_abandon
 
 # What lies below the stack may be damaged, so this is the end.
@@ -170,9 +181,7 @@ to_kernel:
         sw      t0, 0(sp)
         jalr    t2
         lw      sp, 0(sp)
-        each_scratch lw
-        addi    sp, sp, 64
-        mret
+        return_from_interrupt
         end     external_interrupt
 
 # ---- Vectors, indexed by the number of an interrupt; 0 is every exception ----------------------------------------------
@@ -219,6 +228,9 @@ vectors:
         sw      zero, 0(t0)
         addi    t0, t0, 4
         j       1b
-2:      call    main
+2:      la      t0, os_system           # reports of faults before Sys_Init_Kernel() read it, too
+        la      t1, os_running
+        sw      t0, 0(t1)
+        call    main
         j       hal_stop
         end     cpu_reset
