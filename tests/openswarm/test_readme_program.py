@@ -49,7 +49,8 @@ def test_the_project_of_the_readme_runs(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_the_program_blinks_and_drives(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """The README's thread toggles the body LED, and its handler drives after the selector is turned at 0.5 s."""
+    """The README's thread toggles the body LED, and its handler drives after the selector is turned at 0.5 s, as the
+    README shows."""
     (program,) = re.findall(r"```c\n(.*?)```", README, re.DOTALL)
     (tmp_path / "src").mkdir()
     (tmp_path / "src" / "main.c").write_text(program)
@@ -63,3 +64,7 @@ def test_the_program_blinks_and_drives(tmp_path: Path, capsys: pytest.CaptureFix
     seen = capsys.readouterr().err
     assert len(re.findall(r"leds (?:body|off)", seen)) >= 4, seen
     assert re.search(r"motors [1-9]\d* 0 steps in total", seen), seen
+    command, *printed = re.findall(r"```text\n(.*?)```", README, re.DOTALL)[0].splitlines()
+    assert "--watch leds,motors --stimulus turn.txt" in command
+    assert printed
+    assert [line for line in printed if line not in seen.splitlines()] == []
