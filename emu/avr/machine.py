@@ -12,6 +12,7 @@ from __future__ import annotations
 import ctypes
 from collections.abc import Iterable
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Final
 
 from emu.avr.core.addresses import ADDRESSES
@@ -37,8 +38,19 @@ _FAULTS: Final = {
     4: "stack pointer {address:#06x} is outside RAM (0x100 to 0x8ff)",
     5: "execution ran past the end of flash",
     6: "read of flash at {address:#06x}, behind its end at 0x7fff",
+    7: "interrupt {vector} has no handler; the program would start again",
 }
 """Text of each kind of fault (core/avr.h)."""
+VECTORS: Final = (
+    "RESET", "INT0", "INT1", "PCINT0", "PCINT1", "PCINT2", "WDT", "TIMER2_COMPA", "TIMER2_COMPB", "TIMER2_OVF",
+    "TIMER1_CAPT", "TIMER1_COMPA", "TIMER1_COMPB", "TIMER1_OVF", "TIMER0_COMPA", "TIMER0_COMPB", "TIMER0_OVF",
+    "SPI_STC", "USART_RX", "USART_UDRE", "USART_TX", "ADC", "EE_READY", "ANALOG_COMP", "TWI", "SPM_READY",
+)  # fmt: skip
+"""Names of the interrupts by vector, as avr-libc's <avr/interrupt.h> writes them."""
+_CALLS: Final = ((0xFE0E, 0x940E, 2), (0xF000, 0xD000, 1), (0xFFFF, 0x9509, 1))
+"""Mask, match and words of CALL, RCALL and ICALL."""
+_STACK_SEARCHED: Final = 64
+"""Bytes of the stack in which a return address is searched."""
 
 
 class Program:
@@ -60,7 +72,10 @@ class AvrFault:
 
 @dataclass(frozen=True, slots=True)
 class Change:
-    """A watched register got another value at `cycle`. A byte that the UART has sent is a change of UDR0."""
+    """A watched register got another value at `cycle`. A byte that the UART has sent is a change of UDR0.
+
+    A jump to address 0 is a change of RESTARTED (core/state.py).
+    """
 
     cycle: int
     register: int
@@ -86,6 +101,8 @@ class Atmega328p:
         self.state.boot_start = BOOT_START
         self.state.avcc_uv = self.state.aref_uv = 3_300_000
         self.state.random = (seed * 2_654_435_761 & 0xFFFF_FFFF) or 1
+        end = image.symbols.find("_end")
+        self.state.data_end = end.address - 1 if end is not None and end.space == "data" else 0
         self.changes: Final[list[Change]] = []
         """Outputs since the caller cleared the list."""
         self._native["avr_power_on"](self._address)
@@ -151,8 +168,32 @@ class Atmega328p:
         state = self.state
         if not state.fault:
             return None
-        text = _FAULTS[state.fault].format(address=state.fault_address)
+        address = state.fault_address
+        text = _FAULTS[state.fault].format(address=address, vector=VECTORS[address % len(VECTORS)])
         return AvrFault(text, 2 * state.fault_pc, state.cycle)
+
+    @property
+    def stack_overflow(self) -> tuple[int, int] | None:
+        """Return byte address and cycle of the first instruction by which the stack grew into the program's variables.
+
+        None if that has not happened, or if the image does not define where they end (symbol `_end`).
+        """
+        state = self.state
+        return (2 * state.overflow_pc, state.overflow_at) if state.overflow_at else None
+
+    def caller(self) -> int | None:
+        """Return the byte address of the call whose return address is uppermost on the stack, None if there is none.
+
+        A number on the stack that looks like a return address can be mistaken for one.
+        """
+        stack = self.peek_bytes(self.sp + 1, _STACK_SEARCHED)
+        for high, low in pairwise(stack):
+            after = high << 8 | low
+            for mask, match, words in _CALLS:
+                at = 2 * (after - words)
+                if 0 <= at < FLASH_BYTES and int.from_bytes(self.state.flash[at : at + 2], "little") & mask == match:
+                    return at
+        return None
 
     def watch(self, registers: Iterable[int]) -> None:
         """Report changes of I/O registers (data addresses) in `changes`."""

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import Any, Final
 
 from emu.avr.image import AvrImage, load_avr_image
-from emu.avr.machine import HZ, AvrFault
+from emu.avr.machine import HZ, Atmega328p, AvrFault
 from emu.boards.kilobot.messages import DATA_SIZE, TYPES, Message, frame
 from emu.boards.kilobot.observer import WATCHED, KilobotObserver, Report
 from emu.boards.kilobot.overhead import send_frame
@@ -92,12 +92,26 @@ def run_kilobot(
     except KeyboardInterrupt:
         run.reason = "interrupted"
     _report(run, observer.end(), show)
-    if machine.state.unmodelled:
-        run.notes.append(f"register {machine.state.unmodelled:#04x} has no model; it behaves as plain memory")
+    run.notes += _notes(machine)
     run.host_seconds = time.perf_counter() - start
     run.pc = machine.pc if run.fault is None else run.fault.pc
     run.cycles = machine.state.halted_at if run.reason == "halt" else machine.cycle
     return run
+
+
+def _notes(machine: Atmega328p) -> list[str]:
+    """Return what the user should know of a run besides its end."""
+    notes = []
+    if machine.state.unmodelled:
+        notes.append(f"register {machine.state.unmodelled:#04x} has no model; it behaves as plain memory")
+    if machine.stack_overflow is not None:
+        pc, cycle = machine.stack_overflow
+        notes.append(f"stack overflow: at {machine.image.place(pc)}, cycle {cycle}, the stack grew into the program's"
+                     f" variables, which end at {machine.state.data_end:#06x}")  # fmt: skip
+    caller = machine.caller() if machine.fault is not None else None
+    if caller is not None:
+        notes.append(f"the stack's uppermost return address belongs to the call at {machine.image.place(caller)}")
+    return notes
 
 
 def _send(swarm: KilobotSwarm, command: str) -> int | None:

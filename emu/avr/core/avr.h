@@ -16,14 +16,14 @@ enum {
 enum { FLAG_C = 1, FLAG_Z = 2, FLAG_N = 4, FLAG_V = 8, FLAG_S = 16, FLAG_H = 32, FLAG_T = 64, FLAG_I = 128 };
 
 enum { // kinds of fault (machine.py)
-    FAULT_NONE, FAULT_ILLEGAL, FAULT_LOAD, FAULT_STORE, FAULT_STACK, FAULT_END, FAULT_FLASH
+    FAULT_NONE, FAULT_ILLEGAL, FAULT_LOAD, FAULT_STORE, FAULT_STACK, FAULT_END, FAULT_FLASH, FAULT_VECTOR
 };
 
 // Kinds of input. Values: port << 16 | driven << 8 | level; a byte; microvolts of channel INPUT_ANALOG + n.
 enum { INPUT_PIN, INPUT_UART, INPUT_ANALOG };
 
 enum { CH_TEMPERATURE = 8, CH_AIN0, CH_AIN1 }; // of analog_uv
-enum { BANDGAP_UV = 1100000 };
+enum { BANDGAP_UV = 1100000, LARGE_FRAME = 64 };
 
 static int bit_of(const struct avr *m, u32 address, u32 bit)
 {
@@ -57,6 +57,16 @@ static void schedule(struct avr *m, u32 event, u64 at)
     m->due[event] = at;
     if (at < m->next_due)
         m->next_due = at;
+}
+
+// The stack grows down to address `at`. Farther below than a large frame it is another stack, of a thread.
+static inline void note_stack(struct avr *m, u32 at, u32 pc, u64 cycle)
+{
+    if (at >= m->stack_low || at + LARGE_FRAME < m->stack_low)
+        return;
+    m->stack_low = (u16)at;
+    if (at <= m->data_end && !m->overflow_at)
+        m->overflow_at = cycle, m->overflow_pc = (u16)pc;
 }
 
 static u32 random_bits(struct avr *m)

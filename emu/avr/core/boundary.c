@@ -7,18 +7,50 @@ static void fault(struct avr *m, u32 kind, u32 address)
     m->fault = (u16)kind, m->fault_address = (u16)address;
 }
 
+static u32 flash_word(const struct avr *m, u32 pc)
+{
+    return m->flash[2 * (pc & PC_MASK)] | (u32)m->flash[2 * (pc & PC_MASK) + 1] << 8;
+}
+
+// The target of a JMP or RJMP; -1: another instruction.
+static int jump_target(const struct avr *m, u32 pc)
+{
+    u32 word = flash_word(m, pc);
+    if ((word & 0xFE0E) == 0x940C)
+        return (int)(flash_word(m, pc + 1) & PC_MASK);
+    return word >> 12 == 0xC ? (int)((pc + 1 + (word & 0xFFF) - (word >> 11 & 1 ? 0x1000 : 0)) & PC_MASK) : -1;
+}
+
+// Whether the program has no handler for a vector: it leads to code that jumps to the start, as other vectors do.
+static int is_unhandled(const struct avr *m, u32 base, u32 vector)
+{
+    int target = jump_target(m, base + 2 * vector);
+    if (target < 0 || jump_target(m, (u32)target) != (int)base)
+        return 0;
+    u32 others = 0;
+    for (u32 other = 1; other < VECTORS; other++)
+        others += other != vector && jump_target(m, base + 2 * other) == target;
+    return others > 0;
+}
+
 static void enter_interrupt(struct avr *m, u32 pending)
 {
-    u32 vector = (u32)__builtin_ctz(pending), sp = word_at(m, SPL);
+    u32 vector = (u32)__builtin_ctz(pending), sp = word_at(m, SPL), base = m->data[MCUCR] & 2 ? m->boot_start : 0;
+    if (is_unhandled(m, base, vector)) {
+        m->fault_pc = m->pc;
+        fault(m, FAULT_VECTOR, vector);
+        return;
+    }
     if (sp < RAM_START + 1 || sp > RAMEND) {
         m->fault_pc = m->pc;
         fault(m, FAULT_STACK, sp);
         return;
     }
     m->data[sp] = (u8)m->pc, m->data[sp - 1] = (u8)(m->pc >> 8);
+    note_stack(m, sp - 1, m->pc, m->cycle);
     set_pair(m->data + SPL, sp - 2);
     m->data[SREG_AT] &= (u8)~FLAG_I;
-    m->pc = (u16)(2 * vector + (m->data[MCUCR] & 2 ? m->boot_start : 0));
+    m->pc = (u16)(base + 2 * vector);
     m->tracing = 0, m->round = 0, m->counts_until = 0;
     m->cycle += INTERRUPT_CYCLES;
     acknowledge(m, vector);

@@ -32,6 +32,16 @@ do_COUNT_DOWN : { \
     } \
     NEXT(1); \
 } \
+do_RESTART : { \
+    START(0, 1); \
+    if (m->started && m->watched[RESTARTED]) { \
+        SAVE(); \
+        log_change(m, RESTARTED, 0, cycle); \
+        RESUME(); \
+    } \
+    m->started = 1; \
+    goto *labels[code[PC_MASK + 3].op]; \
+} \
 do_ILLEGAL: \
     FAIL(FAULT_ILLEGAL, insn->word); \
 do_END: \

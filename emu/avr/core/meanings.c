@@ -179,6 +179,7 @@ static inline u16 word_difference(u8 *s, u32 a, u32 b)
             FAIL(FAULT_STACK, sp_); \
         data[sp_] = (value); \
         SET_PAIR(SPL, sp_ - 1); \
+        note_stack(m, sp_, (u32)(insn - code), cycle); \
     } while (0)
 #define POP() \
     ({ \
@@ -227,6 +228,7 @@ static inline u16 word_difference(u8 *s, u32 a, u32 b)
             FAIL(FAULT_STACK, sp_); \
         data[sp_] = (u8)pc, data[sp_ - 1] = (u8)(pc >> 8); \
         SET_PAIR(SPL, sp_ - 2); \
+        note_stack(m, sp_ - 1, (u32)(insn - code), cycle); \
         pc = to_; \
     } while (0)
 #define RETURN() \

@@ -8,7 +8,8 @@ static u32 row_of(u32 word)
     return OP_ILLEGAL;
 }
 
-// Decode words `first` to `last` of the flash of `m` into `code`, which has an entry per word and two behind the end.
+// Decode words `first` to `last` of the flash of `m` into `code`, which has an entry per word, two behind the end, and
+// one for the operation at address 0: there the program starts, and a jump to it is reported.
 void avr_decode(const struct avr *m, struct insn *code, i64 first, i64 last)
 {
     for (u32 pc = (u32)first; pc <= (u32)last; pc++) {
@@ -24,6 +25,9 @@ void avr_decode(const struct avr *m, struct insn *code, i64 first, i64 last)
             code[pc].op = OP_COUNT_DOWN;
     for (u32 n = 1; n <= 2; n++)
         code[PC_MASK + n] = (struct insn){.op = OP_END, .words = 1};
+    int ends = code[0].op == OP_RJMP && code[0].k == 0; // a program that is nothing but its end
+    if (!first && !ends)
+        code[PC_MASK + 3].op = code[0].op, code[0].op = OP_RESTART;
 }
 
 // Power on: clear all but the inputs, the fuses and the memories that keep their content.

@@ -55,6 +55,11 @@ FIELDS: Final[tuple[tuple[str, str, int], ...]] = (
     ("trace_data", _U8, DATA_BYTES),  # data memory at trace_from
     ("shadow", _U8, 1),  # 1: one instruction runs before the next interrupt
     ("halted", _U8, 1),  # 1: nothing can wake the CPU
+    ("started", _U8, 1),  # 1: the program has started since the last reset
+    ("data_end", _U16, 1),  # last address of the program's variables, 0: unknown
+    ("stack_low", _U16, 1),  # lowest address that the first stack has reached since the reset
+    ("overflow_at", _U64, 1),  # cycle at which the first stack reached data_end, 0: never
+    ("overflow_pc", _U16, 1),
     ("must_reset", _U8, 1),  # 1: the watchdog resets the microcontroller before the next instruction
     ("looping", _U8, 1),  # cycles of a jump to itself that was just executed, else 0
     ("program_changed", _U8, 1),  # 1: flash was written and must be decoded again
@@ -147,6 +152,9 @@ class Avr(ctypes.Structure):
     asleep: int
     log_count: int
     resets: int
+    data_end: int
+    overflow_at: int
+    overflow_pc: int
     program_changed: int
     slept: int
     boot_start: int
@@ -173,15 +181,17 @@ class Decoded(ctypes.Structure):
                 ("k", ctypes.c_uint16), ("word", ctypes.c_uint16)]  # fmt: skip
 
 
-PROGRAM_ENTRIES: Final = FLASH_BYTES // 2 + 2
-"""Entries of a decoded program: one per word, and two behind the end of flash, which fault."""
+PROGRAM_ENTRIES: Final = FLASH_BYTES // 2 + 3
+"""Entries of a decoded program: one per word, two behind the end of flash, which fault, and one for address 0."""
+RESTARTED: Final = 0
+"""Watched "register" whose change is a jump to address 0, which starts the program again without a reset."""
 
 
 def declaration() -> str:
     """Return the C text of the record, its sizes and its events."""
     sizes = {"FLASH_BYTES": FLASH_BYTES, "DATA_BYTES": DATA_BYTES, "RAM_START": RAM_START,
              "EEPROM_BYTES": EEPROM_BYTES, "PAGE_BYTES": PAGE_BYTES, "LOG_ROOM": LOG_ROOM, "INPUT_ROOM": INPUT_ROOM,
-             "TIMERS": TIMERS}  # fmt: skip
+             "TIMERS": TIMERS, "RESTARTED": RESTARTED}  # fmt: skip
     lines = [f"enum {{ {', '.join(f'{name} = {value}' for name, value in sizes.items())} }};"]
     lines.append(f"enum {{ {', '.join(f'EVENT_{name}' for name in EVENTS)}, EVENTS }};")
     members = (f"    {kind} {name}{'' if count == 1 else f'[{count}]'};" for name, kind, count in FIELDS)

@@ -46,7 +46,7 @@ static int is_countdown(const struct insn *code, u32 pc)
 {
     const struct insn *branch = code + pc, *first = code + branch->k;
     u32 length = pc - branch->k;
-    if (branch->op != OP_BRBC || branch->r != 1 || branch->k >= pc || length > 4)
+    if (branch->op != OP_BRBC || branch->r != 1 || branch->k >= pc || !branch->k || length > 4)
         return 0;
     if (length == 1)
         return first->op == OP_DEC || (first->op == OP_SBIW && first->k == 1);

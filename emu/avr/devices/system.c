@@ -102,10 +102,11 @@ static void reset_cpu(struct avr *m, u32 cause)
         m->due[event] = NEVER;
     m->data[MCUSR] = (u8)cause;
     m->data[SPL] = RAMEND & 0xFF, m->data[SPH] = RAMEND >> 8;
+    m->stack_low = RAMEND + 1;
     m->data[UCSR0A] = 1u << UDRE, m->data[UCSR0C] = 6;
     m->data[OSCCAL] = 0x80;
     m->pc = m->starts_in_boot ? m->boot_start : 0;
-    m->asleep = m->shadow = m->halted = 0;
+    m->asleep = m->shadow = m->halted = m->started = 0;
     m->sleep_from = NEVER;
     for (u32 n = 0; n < TIMERS; n++) {
         m->timer_at[n] = m->cycle, m->timer_position[n] = m->timer_turn[n] = 0, m->timer_blocked[n] = 0;

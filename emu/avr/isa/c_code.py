@@ -13,9 +13,13 @@ SLOTS: Final = {"d": "d", "r": "r", "b": "r", "K": "k", "A": "k", "q": "k", "k":
 NAMES: Final = {"Rd": "data[d]", "Rr": "data[r]", "R0": "data[0]"}
 
 
+SPECIAL: Final = ("ILLEGAL", "END", "COUNT_DOWN", "RESTART")
+"""Operations behind those of the rows; `row_of` returns the first one for a word without a row."""
+
+
 def decoder() -> str:
     """Return the C text of the operations, of `row_of` and of `operands_of`."""
-    lines = [f"enum {{ {', '.join('OP_' + row.name for row in ROWS)}, OP_ILLEGAL, OP_END, OP_COUNT_DOWN, OPS }};",
+    lines = [f"enum {{ {', '.join('OP_' + name for name in (*(row.name for row in ROWS), *SPECIAL))}, OPS }};",
              f"enum {{ ERASED = {ERASED:#06x}, ERASED_BITS = {ERASED_BITS:#06x} }};",
              "static const struct { u16 mask, match; u8 words; } rows[OPS] = {"]  # fmt: skip
     lines += [f"    {{{row.mask:#06x}, {row.match:#06x}, {row.words}}}," for row in ROWS]
@@ -52,8 +56,8 @@ def _value(row: Row, letter: str) -> str:
 
 def labels() -> str:
     """Return the C text of the interpreter's table of labels, by operation."""
-    names = ", ".join(f"&&do_{row.name}" for row in ROWS)
-    return f"static const void *const labels[OPS] = {{{names}, &&do_ILLEGAL, &&do_END, &&do_COUNT_DOWN}};"
+    names = ", ".join(f"&&do_{name}" for name in (*(row.name for row in ROWS), *SPECIAL))
+    return f"static const void *const labels[OPS] = {{{names}}};"
 
 
 def bodies() -> str:

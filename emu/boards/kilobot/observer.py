@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from emu.avr.core.addresses import ADDRESSES
+from emu.avr.core.state import RESTARTED
 from emu.avr.machine import HZ, UDR0, Change
 from emu.boards.kilobot.messages import PulseDecoder
 
@@ -20,11 +21,15 @@ WDRF: Final = 3
 MCUSR, TCCR2A, TCCR2B, OCR2A, OCR2B = (
     ADDRESSES[name] for name in ("MCUSR", "TCCR2A", "TCCR2B", "OCR2A", "OCR2B")
 )
-WATCHED: Final = (DDRB, PORTB, DDRC, PORTC, DDRD, PORTD, TCCR2A, TCCR2B, OCR2A, OCR2B, UDR0, MCUSR)
+WATCHED: Final = (DDRB, PORTB, DDRC, PORTC, DDRD, PORTD, TCCR2A, TCCR2B, OCR2A, OCR2B, UDR0, MCUSR, RESTARTED)
 LED_PINS: Final = (((DDRD, PORTD, 5), (DDRD, PORTD, 4)), ((DDRC, PORTC, 3), (DDRC, PORTC, 2)),
                    ((DDRC, PORTC, 5), (DDRC, PORTC, 4)))  # fmt: skip
 """Pins of red, green and blue; the first counts 1, the second 2. A pin lights if it is a low output."""
 EMITTERS: Final = 0xC7
+LIGHT_BITS: Final = {DDRB: EMITTERS, PORTB: EMITTERS}
+LED_BITS: Final = {DDRC: 0x3C, PORTC: 0x3C, DDRD: 0x30, PORTD: 0x30}
+MOTOR_BITS: Final = {DDRB: 0x08, DDRD: 0x08, TCCR2A: 0xA0, TCCR2B: 0x07, OCR2A: 0xFF, OCR2B: 0xFF}
+"""Bits of the registers on which emitters, LED and motors depend."""
 SETTLED: Final = HZ // 1000
 """Cycles for which LED and motors must keep a state to be reported: 1 ms. Registers change one after the other."""
 
@@ -89,6 +94,7 @@ class KilobotObserver:
         self._decoder = PulseDecoder()
         self._text = bytearray()
         self._text_at = 0
+        self._restarted_at = -SETTLED
 
     def reports_of(self, changes: Iterable[Change]) -> Iterator[Report]:
         """Yield the reports of changes."""
@@ -126,19 +132,33 @@ class KilobotObserver:
                 yield Report(self._text_at, "uart", {"text": self._text.decode("latin-1")})
                 self._text.clear()
             return
-        if change.register == MCUSR and is_reset(self._registers.get(MCUSR, 0), change.value):
-            self._registers.clear()
-            yield Report(change.cycle, "reset", {"cause": "watchdog"})
+        if change.register == RESTARTED:
+            if change.cycle - self._restarted_at >= SETTLED:
+                yield Report(change.cycle, "reset", {"cause": "jump"})
+            self._restarted_at = change.cycle
+            return
+        changed = self._registers.get(change.register, 0) ^ change.value
         was_lit = self._is_lit()
         self._registers[change.register] = change.value
-        if self._is_lit() and not was_lit:
+        if change.register == MCUSR and is_reset(change.value ^ changed, change.value):
+            self._registers = {MCUSR: change.value}
+            yield Report(change.cycle, "reset", {"cause": "watchdog"})
+            self._note("led", (0, 0, 0), change.cycle)
+            self._note("motors", (0, 0), change.cycle)
+        if changed & LIGHT_BITS.get(change.register, 0) and self._is_lit() and not was_lit:
             message = self._decoder.pulse(change.cycle)
             if message is not None:
                 yield Report(change.cycle, "message", {"type": message.type, "data": message.data.hex(),
                                                        "crc": "right" if message.is_whole else "wrong"})  # fmt: skip
-        for kind, state in (("led", led_of(self._registers)), ("motors", motors_of(self._registers))):
-            if self._waiting.get(kind, (0, self._reported[kind]))[1] != state:
-                self._waiting[kind] = (change.cycle, state)
+        if changed & LED_BITS.get(change.register, 0):
+            self._note("led", led_of(self._registers), change.cycle)
+        if changed & MOTOR_BITS.get(change.register, 0):
+            self._note("motors", motors_of(self._registers), change.cycle)
+
+    def _note(self, kind: str, state: tuple[int, ...], cycle: int) -> None:
+        """Note that LED or motors have a state from a cycle on; it is reported once it has settled."""
+        if self._waiting.get(kind, (0, self._reported[kind]))[1] != state:
+            self._waiting[kind] = (cycle, state)
 
     def _is_lit(self) -> bool:
         return bool(self._registers.get(DDRB, 0) & self._registers.get(PORTB, 0) & EMITTERS)

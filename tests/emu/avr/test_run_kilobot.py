@@ -97,6 +97,40 @@ def test_a_fault_names_function_and_line(build: Build, capsys: pytest.CaptureFix
     assert f"program.c:{line})" in told
 
 
+MISTAKES = {
+    "interrupt TIMER1_OVF has no handler": "int main(void) { TCCR1B = 1; TIMSK1 = 1; sei(); for (;;) PORTC = 1; }",
+    "belongs to the call at 0x": "void (*volatile f)(void) = (void (*)(void))0x3f00; int main(void) { f(); }",
+    "stack overflow: at 0x": """
+        volatile uint8_t data[1900];
+        int deep(int n) { volatile char frame[20]; frame[n % 20] = n; return n ? deep(n - 1) + frame[3] : data[9]; }
+        int main(void) { data[0] = deep(12); cli(); sleep_mode(); for (;;) ; }""",
+}
+
+
+@pytest.mark.parametrize("text", MISTAKES)
+def test_mistakes_are_named(build: Build, capsys: pytest.CaptureFixture[str], text: str) -> None:
+    """An interrupt without handler, a call of a wild pointer and a stack in the variables are named with a place."""
+    image = build(MISTAKES[text])
+    status = main(["run", image.path, "--board", "kilobot", "--ohc", "none", "--cycles", "200000"])
+    told = capsys.readouterr().err
+    assert text in told
+    assert status == (0 if "overflow" in text else 1)
+    assert "program.c:" in told
+
+
+def test_a_jump_to_the_start_is_reported(build: Build, capsys: pytest.CaptureFixture[str]) -> None:
+    """A program that jumps to address 0 starts again without a reset: one report, not one at its first start."""
+    image = build("""
+        static uint8_t starts __attribute__((section(".noinit")));
+        int main(void) {
+            starts = PORTC ? starts + 1 : 0; PORTC = 1;
+            if (starts < 1) asm volatile("jmp 0");
+            cli(); sleep_mode(); for (;;) ;
+        }""")
+    assert main(["run", image.path, "--board", "kilobot", "--ohc", "none"]) == 0
+    assert [line.split(" ", 1)[1] for line in capsys.readouterr().out.splitlines()] == ["reset cause=jump"]
+
+
 def test_refusals(build: Build, capsys: pytest.CaptureFixture[str]) -> None:
     """Options of the e-puck, options of the Kilobot without it, and other files are refused in one line."""
     image = build(BLINK)
