@@ -20,7 +20,7 @@ from arena.analysis.comparison import series_by_seed
 from arena.analysis.statistics import bootstrap_band
 from arena.experiments import Curve
 from arena.experiments.declaration import code_needed
-from arena.scene import dimensions, geometry, palette
+from arena.scene import geometry, palette
 from arena.scene.schema import ObjectKind
 from arena.trial.record import Trial
 
@@ -76,7 +76,7 @@ def _arena(axis: Axes, trial: Trial, sample: int) -> None:
         axis.add_patch(object_patch(trial.scene.kind_of(number), place, fill))
     for index, (x, y) in enumerate(trial.robots[sample]):
         heading = float(trial.columns[f"r{index}_heading"][sample])
-        axis.add_patch(Circle((x, y), dimensions.ROBOT_RADIUS, facecolor=palette.ROBOT, edgecolor="k"))
+        axis.add_patch(Circle((x, y), trial.scene.robot_kind(index).radius_cm, facecolor=palette.ROBOT, edgecolor="k"))
         axis.plot([x, x + 6 * np.cos(heading)], [y, y + 6 * np.sin(heading)], "k", linewidth=1)
     frame(axis, trial)
 

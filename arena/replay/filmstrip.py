@@ -14,7 +14,7 @@ from arena.camera.appearance import COLOURS, NAMES, OBJECT, ROBOT, WALL
 from arena.camera.renderer import WINDOW_COLUMNS
 from arena.replay.page import sample_data
 from arena.robots.controller import STRIP_COLUMNS, STRIP_PIXELS
-from arena.scene import dimensions, geometry, palette
+from arena.scene import geometry, palette
 from arena.trial.record import Trial
 
 PICTURES: Final = 6
@@ -105,7 +105,8 @@ def _from_above(axis: Any, trial: Trial, data: dict[str, Any], robot: int, sampl
                    Circle((place[0], place[1]), kind.radius_cm))  # fmt: skip
         outline.set(facecolor=palette.OBJECT, edgecolor="k")
         axis.add_patch(outline)
-    for rx, ry in trial.robots[sample]:
-        axis.add_patch(Circle((rx, ry), dimensions.ROBOT_RADIUS, facecolor=palette.ROBOT, edgecolor="k"))
+    for number, (rx, ry) in enumerate(trial.robots[sample]):
+        radius = trial.scene.robot_kind(number).radius_cm
+        axis.add_patch(Circle((rx, ry), radius, facecolor=palette.ROBOT, edgecolor="k"))
     axis.plot([x, x + 150 * np.cos(heading)], [y, y + 150 * np.sin(heading)], "k:", linewidth=0.8)
     axis.set(xlim=(x - VIEW_CM, x + VIEW_CM), ylim=(y - VIEW_CM, y + VIEW_CM), aspect="equal")

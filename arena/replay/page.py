@@ -82,7 +82,10 @@ def trial_data(trial: Trial) -> dict[str, Any]:
             f" ({one.name} {trial.scene.id_of(robot)})" if one.name else ""
             for robot, one in enumerate(map(trial.scene.group_of, range(trial.scene.robots.count)))
         ],
-        "robotRadius": dimensions.ROBOT_RADIUS,
+        "bodies": [
+            {"kind": kind.name, "radius": kind.radius_cm}
+            for kind in map(trial.scene.robot_kind, range(trial.scene.robots.count))
+        ],
         "palette": {"seen": palette.SEEN, "groups": palette.GROUPS},
         "sight": min(trial.scene.camera.range_cm, 1000.0),
         "infrared": {
@@ -137,7 +140,7 @@ def sample_data(trial: Trial) -> dict[str, Any]:
 
 
 def _camera_views(trial: Trial) -> list[tuple[list[int], list[bytes]]]:
-    """Return per robot the readings of its line-of-sight sensor and its camera strips.
+    """Return per robot the readings of its line-of-sight sensor and its camera strips, as recorded without a camera.
 
     If the firmware does not report its sensor, the reading is computed from the poses. A scripted robot has no camera;
     its strip is rendered in noise-free colours."""
@@ -150,6 +153,9 @@ def _camera_views(trial: Trial) -> list[tuple[list[int], list[bytes]]]:
     robots, objects = trial.robots.tolist(), trial.object_poses
     for robot in range(count):
         seen, strips = list(map(int, trial.columns[f"r{robot}_seen"])), list(trial.columns[f"r{robot}_strip"])
+        if not scene.robot_kind(robot).has_camera:
+            views.append((seen, strips))
+            continue
         is_script = not any(strips)
         renderer = Renderer(scene, robot, traits_of(scene, seed, robot))
         for sample, (places, things) in enumerate(zip(robots, objects, strict=True)):

@@ -17,13 +17,14 @@ from PIL import Image, ImageDraw
 from arena.camera.appearance import COLOURS
 from arena.replay.page import sample_data
 from arena.robots.controller import STRIP_PIXELS
-from arena.scene import dimensions, geometry, palette
+from arena.scene import geometry, palette
 from arena.scene.loader import Scene
+from arena.scene.robot_kind import EPUCK, KILOBOT
 from arena.trial.record import RecordError, Trial, reason_of
 from emu.host.files import atomic_file
 
 SCALE: Final = 1.6
-"""Pixels per cm."""
+"""Pixels per cm in a scene of e-pucks. The smallest robot of a scene is as large as an e-puck."""
 FRAMES_PER_S: Final = 12.5
 """Frame rate of the video; a frame lasts 8 of the hundredths of a second in which GIF counts."""
 LIMIT: Final = 20_000
@@ -74,55 +75,68 @@ def frames(trial: Trial, times: list[float]) -> Iterator[Image.Image]:
 
 def arena_picture(
     scene: Scene, robots: Sequence[tuple[float, float, float]], seen: Sequence[int],
-    objects: Sequence[tuple[float, ...]], labels: Sequence[int],
+    objects: Sequence[tuple[float, ...]], labels: Sequence[int], leds: Sequence[int] = (),
 ) -> Image.Image:  # fmt: skip
-    """Draw the arena from above, `SCALE` pixels per cm.
+    """Draw the arena from above, the smallest robot as large as an e-puck with `SCALE` pixels per cm.
 
     `robots` are poses in cm and rad, `seen` the values of their line-of-sight sensors. `objects` are x and y in cm, and
-    for polygons the heading in rad. `labels` are the cluster numbers of the objects.
+    for polygons the heading in rad. `labels` are the cluster numbers of the objects. `leds` are the
+    LEDs of the robots: a Kilobot has its colour, grey if it is dark.
     """
-    width, height = round(scene.arena.width_cm * SCALE), round(scene.arena.height_cm * SCALE)
+    least = min((scene.robot_kind(number).radius_cm for number in range(len(robots))), default=EPUCK.radius_cm)
+    scale = SCALE * (EPUCK.radius_cm / least)
+    width, height = round(scene.arena.width_cm * scale), round(scene.arena.height_cm * scale)
     image = Image.new("RGB", (width, height), _PAPER)
     draw = ImageDraw.Draw(image)
     draw.rectangle((0, 0, width - 1, height - 1), outline=_INK)
 
     def disc(x: float, y: float, radius: float, fill: tuple[int, int, int]) -> None:
-        left, low, r = x * SCALE, height - y * SCALE, radius * SCALE
+        left, low, r = x * scale, height - y * scale, radius * scale
         draw.ellipse((left - r, low - r, left + r, low + r), fill=fill, outline=_INK)
 
     for one in scene.obstacles:
         if one.polygon:
-            draw.polygon([(x * SCALE, height - y * SCALE) for x, y in one.polygon], outline=_INK)
+            draw.polygon([(x * scale, height - y * scale) for x, y in one.polygon], outline=_INK)
         else:
             disc(one.x_cm, one.y_cm, one.radius_cm, _PAPER)
     for thing, (place, label) in enumerate(zip(objects, labels, strict=True)):
         kind, fill = scene.kind_of(thing), _CLUSTERS[label % len(_CLUSTERS)] if labels.count(label) > 1 else _PALE
         if kind.polygon:
             corners = geometry.turned(geometry.centred(kind.polygon), *place)
-            draw.polygon([(x * SCALE, height - y * SCALE) for x, y in corners], fill=fill, outline=_INK)
+            draw.polygon([(x * scale, height - y * scale) for x, y in corners], fill=fill, outline=_INK)
         else:
             disc(place[0], place[1], kind.radius_cm, fill)
     for number, ((x, y, heading), answer) in enumerate(zip(robots, seen, strict=True)):
-        disc(x, y, dimensions.ROBOT_RADIUS, _SEEN[answer])
-        tip = (x + 9 * math.cos(heading)) * SCALE, height - (y + 9 * math.sin(heading)) * SCALE
-        draw.line((x * SCALE, height - y * SCALE, *tip), fill=_INK, width=2)
-        draw.text((x * SCALE + 8, height - y * SCALE - 14), str(number), fill=_INK)
+        body = scene.robot_kind(number)
+        is_kilobot, ahead = body is KILOBOT, body.radius_cm if body is KILOBOT else 9
+        disc(x, y, body.radius_cm, _led_colour(leds[number] if leds else 0) if is_kilobot else _SEEN[answer])
+        tip = (x + ahead * math.cos(heading)) * scale, height - (y + ahead * math.sin(heading)) * scale
+        draw.line((x * scale, height - y * scale, *tip), fill=_INK, width=2)
+        draw.text((x * scale + 8, height - y * scale - 14), str(number), fill=_INK)
     return image
+
+
+def _led_colour(leds: int) -> tuple[int, int, int]:
+    """Return the colour of a Kilobot's LED; grey if it is dark."""
+    return (85 * (leds & 3), 85 * (leds >> 2 & 3), 85 * (leds >> 4 & 3)) if leds else _PALE
 
 
 def _frame(scene: Scene, data: dict[str, Any], sample: int, caption: str) -> Image.Image:
     """Draw one frame: the arena from above, `caption`, and the camera strips."""
     robots = [(one["x"][sample], one["y"][sample], one["heading"][sample]) for one in data["robots"]]
     seen = [one["seen"][sample] for one in data["robots"]]
-    picture = arena_picture(scene, robots, seen, data["objects"][sample], data["clusters"][sample])
-    (width, height), rows = picture.size, len(robots)
+    picture = arena_picture(scene, robots, seen, data["objects"][sample], data["clusters"][sample],
+                            [one["leds"][sample] for one in data["robots"]])  # fmt: skip
+    cameras = sum(scene.robot_kind(number).has_camera for number in range(len(robots)))
+    (width, height), rows = picture.size, len(robots) if cameras else 0
     total = height + _LINE * (rows + 1) + 4
     image = Image.new("RGB", (width + width % 2, total + total % 2), _PAPER)
     image.paste(picture)
     draw = ImageDraw.Draw(image)
     draw.text((4, height + 2), f"{data['t'][sample]:6.1f} s   {caption}", fill=_INK)
     for number in range(rows):
-        _strip(draw, number, data["robots"][number], sample, height + _LINE * (number + 1) + 2)
+        if scene.robot_kind(number).has_camera:
+            _strip(draw, number, data["robots"][number], sample, height + _LINE * (number + 1) + 2)
     return image
 
 
@@ -140,7 +154,8 @@ def _strip(draw: ImageDraw.ImageDraw, number: int, robot: dict[str, Any], sample
 
 def _gif_colours() -> list[tuple[int, int, int]]:
     """Return the colours of a GIF: drawn colours, colours of the camera, and ramps for noise and smooth edges."""
-    drawn = [_INK, _PAPER, _PALE, *_SEEN, *_CLUSTERS, *(tuple(map(int, colour)) for colour in COLOURS)]
+    leds = [(85 * red, 85 * green, 85 * blue) for red in range(4) for green in range(4) for blue in range(4)]
+    drawn = [_INK, _PAPER, _PALE, *leds, *_SEEN, *_CLUSTERS, *(tuple(map(int, colour)) for colour in COLOURS)]
     ramps = [(grey, grey, grey) for grey in range(0, 256, 8)]
     ramps += [(level, level // 6, level // 6) for level in range(8, 256, 8)]
     ramps += [(level // 5, level, level // 4) for level in range(8, 160, 8)]

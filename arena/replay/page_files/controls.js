@@ -63,5 +63,5 @@ canvas.onclick = e => {
   if (dragged) { dragged = false; return; }
   const near = d.robots.map((_, i) => { const [x, y] = pose(i, share()); return [Math.hypot(X(x) - e.offsetX, Y(y) - e.offsetY), i]; });
   near.sort((a, b) => a[0] - b[0]);
-  choose(near.length && near[0][0] < Math.max(2.5 * d.robotRadius * scale, 15) ? near[0][1] : -1);
+  choose(near.length && near[0][0] < Math.max(2.5 * d.bodies[near[0][1]].radius * scale, 15) ? near[0][1] : -1);
 };

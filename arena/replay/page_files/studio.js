@@ -53,7 +53,7 @@ function inspect(of) {
 function grip(e) {                       // the robot or object under the pointer
   const near = (places, reach) => places.map(([x, y], i) => [Math.hypot(X(x) - e.offsetX, Y(y) - e.offsetY) - reach(i) * scale, i])
     .sort((a, b) => a[0] - b[0])[0];
-  const robot = near(d.studio.now.robots, () => d.robotRadius), object = near(d.studio.now.objects, i => d.kinds[i].radius);
+  const robot = near(d.studio.now.robots, i => d.bodies[i].radius), object = near(d.studio.now.objects, i => d.kinds[i].radius);
   if (robot && robot[0] < 4) return {kind: "robot", number: robot[1]};
   return object && object[0] < 4 ? {kind: "object", number: object[1]} : null;
 }

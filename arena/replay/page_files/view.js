@@ -65,6 +65,16 @@ function shape(one, fill) {
 function lit(robot) {                    // LEDs that are on now or were on since the previous sample
   return d.lights[sample].reduce((leds, l) => l.robot === robot ? leds | l.leds : leds, d.robots[robot].leds[sample]);
 }
+function isKilobot(robot) { return d.bodies[robot].kind === "kilobot"; }
+function colour(robot) {                 // of a Kilobot's LED at the present time; grey: dark
+  let leds = d.robots[robot].leds[sample];
+  for (const l of d.lights[sample + 1] || []) if (l.robot === robot && l.cycle / FCY <= clock) leds = l.leds;
+  return leds ? `rgb(${85 * (leds & 3)} ${85 * (leds >> 2 & 3)} ${85 * (leds >> 4 & 3)})` : "#ddd";
+}
+function ledNames(robot, leds) {
+  if (isKilobot(robot)) return leds ? `red ${leds & 3} green ${leds >> 2 & 3} blue ${leds >> 4 & 3}` : "";
+  return LEDS.filter((_, bit) => leds >> bit & 1).join(" ");
+}
 function share() {                       // elapsed share of the time to the next sample
   if (sample + 1 >= d.t.length) return 0;
   return Math.min(Math.max((clock - d.t[sample]) / (d.t[sample + 1] - d.t[sample]), 0), 1);
@@ -110,8 +120,8 @@ function drawTrails() {
 }
 function drawSensors(part) {             // axes of camera and infrared sensors, without what blocks them
   d.robots.forEach((r, i) => {
-    if (chosen >= 0 && chosen !== i) return;
-    const [x, y, a] = pose(i, part), from = d.robotRadius;
+    if (chosen >= 0 && chosen !== i || isKilobot(i)) return;
+    const [x, y, a] = pose(i, part), from = d.bodies[i].radius;
     const line = (angle, length) => {
       g.beginPath(); g.moveTo(X(x + from * Math.cos(angle)), Y(y + from * Math.sin(angle)));
       g.lineTo(X(x + (from + length) * Math.cos(angle)), Y(y + (from + length) * Math.sin(angle))); g.stroke();
@@ -152,18 +162,18 @@ function draw() {
   drawLinks(part);
   if (el("sensors").checked) drawSensors(part);
   d.robots.forEach((r, i) => {
-    const [x, y, a] = pose(i, part);
-    disc(x, y, d.robotRadius, SEEN_COLOUR[r.seen[sample]] || "#6688aa");
-    g.beginPath(); g.moveTo(X(x), Y(y)); g.lineTo(X(x + 8 * Math.cos(a)), Y(y + 8 * Math.sin(a))); g.stroke();
-    const on = lit(i);
+    const [x, y, a] = pose(i, part), radius = d.bodies[i].radius, ahead = isKilobot(i) ? radius : 8;
+    disc(x, y, radius, isKilobot(i) ? colour(i) : SEEN_COLOUR[r.seen[sample]] || "#6688aa");
+    g.beginPath(); g.moveTo(X(x), Y(y)); g.lineTo(X(x + ahead * Math.cos(a)), Y(y + ahead * Math.sin(a))); g.stroke();
+    const on = isKilobot(i) ? 0 : lit(i);
     for (let led = 0; led < 8; led++) if (on >> led & 1) {
       const b = a - led * BEARING;
-      dot(x + d.robotRadius * Math.cos(b), y + d.robotRadius * Math.sin(b), "#f00");
+      dot(x + radius * Math.cos(b), y + radius * Math.sin(b), "#f00");
     }
-    if (on >> 8 & 1) dot(x + (d.robotRadius + 1.5) * Math.cos(a), y + (d.robotRadius + 1.5) * Math.sin(a), "#fb0");
+    if (on >> 8 & 1) dot(x + (radius + 1.5) * Math.cos(a), y + (radius + 1.5) * Math.sin(a), "#fb0");
     if (on >> 9 & 1) dot(x, y, "#0f0");
     if (events(i).length || i === chosen) {
-      g.beginPath(); g.arc(X(x), Y(y), (d.robotRadius + 3) * scale, 0, 2 * Math.PI);
+      g.beginPath(); g.arc(X(x), Y(y), (radius + 3) * scale, 0, 2 * Math.PI);
       g.lineWidth = 2; g.strokeStyle = i === chosen ? "#0072b2" : "#d55e00"; g.stroke(); g.lineWidth = 1; g.strokeStyle = INK;
     }
     g.fillStyle = INK; g.fillText(i, X(x) + 8, Y(y) - 8);
@@ -197,12 +207,16 @@ function drawPlot() {
     q.beginPath(); q.strokeStyle = "#d55e00"; const at = clock / end * width; q.moveTo(at, top); q.lineTo(at, top + high); q.stroke();
   });
 }
+function drive(robot) {                  // text: wheel speeds and what the robot sees, or duties and LED
+  const r = d.robots[robot], of = by => `${(by * r.left[sample]).toFixed(0)}, ${(by * r.right[sample]).toFixed(0)}`;
+  if (isKilobot(robot)) return `motors ${of(1)} of 255  LED ${ledNames(robot, r.leds[sample]) || "off"}`;
+  return `wheels ${of(10)} mm/s  sees ${SEEN[r.seen[sample]] || "?"}`;
+}
 function drawChosen() {
   if (chosen < 0) { el("chosen").textContent = "click a robot, or press n"; return; }
   const r = d.robots[chosen], what = events(chosen).map(([, t, why]) => `${t.toFixed(1)} s ${why}`).join("\n");
   el("chosen").textContent = `robot ${chosen}${d.names[chosen]}  at ${r.x[sample].toFixed(1)}, ${r.y[sample].toFixed(1)} cm, ` +
-    `${((r.heading[sample] * 180 / Math.PI % 360 + 360) % 360).toFixed(0)}°\nwheels ${(10 * r.left[sample]).toFixed(0)}, ` +
-    `${(10 * r.right[sample]).toFixed(0)} mm/s  sees ${SEEN[r.seen[sample]] || "?"}  load ${(100 * r.load[sample]).toFixed(0)} %` +
+    `${((r.heading[sample] * 180 / Math.PI % 360 + 360) % 360).toFixed(0)}°\n${drive(chosen)}  load ${(100 * r.load[sample]).toFixed(0)} %` +
     (what ? "\n" + what : "");
 }
 function drawStrips() {
@@ -220,8 +234,12 @@ function drawStrips() {
       h.strokeRect(20, y + 1, bytes.length / 3 * STRIP_PIXEL, STRIP_HEIGHT - 2);
     }
     h.fillStyle = INK;
-    h.fillText(`${SEEN[r.seen[sample]] || "?"} ${(100 * r.load[sample]).toFixed(0)} % ` +
-      LEDS.filter((_, bit) => lit(i) >> bit & 1).join(" "), 26 + 20 * STRIP_PIXEL, y + 11);
+    if (isKilobot(i)) {
+      h.fillStyle = colour(i); h.fillRect(20, y + 1, 2 * STRIP_PIXEL, STRIP_HEIGHT - 2);
+      h.fillStyle = INK; h.fillText(drive(i), 26 + 2 * STRIP_PIXEL, y + 11);
+      return;
+    }
+    h.fillText(`${SEEN[r.seen[sample]] || "?"} ${(100 * r.load[sample]).toFixed(0)} % ` + ledNames(i, lit(i)), 26 + 20 * STRIP_PIXEL, y + 11);
   });
 }
 function drawLog() {
@@ -229,8 +247,8 @@ function drawLog() {
   for (let s = sample; s >= 0 && lines.length < 40; s--) {
     const said = d.log[s].concat(d.lights[s], d.messages[s]).filter(l => chosen < 0 || l.robot === chosen || l.to === chosen)
       .sort((a, b) => b.cycle - a.cycle);
-    for (const l of said) lines.push(`${(l.cycle / FCY).toFixed(3)} s  robot ${l.robot}${l.to === undefined ? "" : " → " + l.to}  ` +
-      (l.text === undefined ? "LEDs " + (LEDS.filter((_, bit) => l.leds >> bit & 1).join(" ") || "off") : l.text));
+    for (const l of said) lines.push(`${(l.cycle / FCY).toFixed(3)} s  robot ${l.robot}${l.to === undefined ? "" : " → " + (l.to < 0 ? "all" : l.to)}  ` +
+      (l.text === undefined ? "LEDs " + (ledNames(l.robot, l.leds) || "off") : l.text));
   }
   for (const [robot, t, why] of d.faults) if (t <= d.t[sample]) lines.unshift(`${t.toFixed(1)} s  robot ${robot} ${why}`);
   el("log").textContent = lines.join("\n");

@@ -105,7 +105,7 @@ def test_the_page_loads_scrubs_and_plays_in_a_browser(trial: Path, tmp_path: Pat
 SHOWN = """<pre id="result"></pre><script>
 show(%d);
 const at = (c, x, y) => [...c.getImageData(Math.round(x), Math.round(y), 1, 1).data].slice(0, 3);
-const r = d.robots[0], a = r.heading[sample], ahead = d.robotRadius + 1.5;
+const r = d.robots[0], a = r.heading[sample], ahead = d.bodies[0].radius + 1.5;
 document.getElementById("result").textContent = JSON.stringify({
   log: document.getElementById("log").textContent,
   strip: [0, 10, 19].map(p => at(h, 20 + p * STRIP_PIXEL + 5, 7)),

@@ -11,8 +11,10 @@ from PIL import Image
 
 from arena.cli import main
 from arena.replay import video
+from arena.replay.page import trial_data
 from arena.replay.video import SCALE, frames
 from arena.trial.record import read_trial
+from tests.emu.avr.conftest import needs
 from tests.watchdog import HANG
 
 
@@ -142,3 +144,23 @@ def test_a_full_disk_is_reported_and_leaves_no_half_film(
     assert main(["replay", str(trial), "--export", str(tmp_path / "film.gif")]) == 2
     assert "film.gif: cannot be written: No space left" in capsys.readouterr().err
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_film_shows_the_leds_of_kilobots(tmp_path: Path) -> None:
+    """Kilobots are drawn with their radius, in the colour of the LED, and without camera strips."""
+    needs("avr-gcc")
+    path = tmp_path / "scene.toml"
+    path.write_text('name = "test"\n[arena]\nwidth_cm = 40\nheight_cm = 40\n[clock]\nquantum_ms = 10\n[[robots]]\n'
+                    'kind = "kilobot"\nimage = "gradient"\nplace = "poses"\nposes = '
+                    '[[10, 10, 90], [15, 10, 90]]\n')  # fmt: skip
+    assert main(["run", str(path), "--trials", "1", "--minutes", "0.05", "--out", str(tmp_path / "out")]) == 0
+    trial = read_trial(tmp_path / "out/trial-0001.parquet")
+    first, last = frames(trial, [0.0, 3.0])
+    scale = SCALE * 3.7 / 1.65
+    assert first.size == (round(40 * scale), round(40 * scale) + 18)
+    for number, colour in enumerate(((85, 0, 0), (85, 85, 0))):
+        at = (10 + 5 * number + 1) * scale, 40 * scale - 10 * scale
+        assert (first.getpixel(at), last.getpixel(at)) == ((221, 221, 221), colour)
+    edge = (10 - 2.2) * scale, 40 * scale - 10 * scale
+    assert last.getpixel(edge) == (255, 255, 255)
+    assert [one["kind"] for one in trial_data(trial)["bodies"]] == ["kilobot", "kilobot"]
