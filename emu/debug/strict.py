@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, Final
 from emu.debug.dwarf.location import Unavailable
 from emu.debug.inspector import Inspector
 from emu.debug.threads import RUNNING, Threads
-from emu.dspic30f.exceptions.faults import Breakpoint, Violation
+from emu.dspic30f.exceptions.faults import DebuggerWord, Violation
 from emu.dspic30f.isa.builder import Side, Size
 from emu.dspic30f.isa.facts import facts_of
 from emu.dspic30f.state.state import STACK_POINTER
@@ -76,7 +76,7 @@ class StrictMode:
         self._violation = ""
         try:
             insn = self._machine.core.sequencer.fetch(pc).insn if self._machine.program.executable(pc) else None
-        except Breakpoint:
+        except DebuggerWord:
             insn = None
         self._copying = (
             insn is not None and facts_of(insn).loads > 0 and facts_of(insn).stores > 0 and "MOV" in insn.row.mnemonic

@@ -25,7 +25,7 @@ class Engine(Protocol):
         """Run at least one instruction, starting at PC.
 
         Continue until a boundary has work, a hooked PC is reached or the cycle is `limit` or later. Raises DeviceReset
-        and Breakpoint as `Sequencer.execute` does.
+        and DebuggerWord as `Sequencer.execute` does.
         """
 
     def natively(self, limit: int) -> bool:

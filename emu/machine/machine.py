@@ -17,7 +17,7 @@ from emu.chips.chip import Chip, Vector
 from emu.chips.dspic30f6014a import DSPIC30F6014A
 from emu.dspic30f.core import Core
 from emu.dspic30f.engines import make_engine
-from emu.dspic30f.exceptions.faults import RESTART, Breakpoint, DeviceReset, Violation
+from emu.dspic30f.exceptions.faults import RESTART, DebuggerWord, DeviceReset, Violation
 from emu.dspic30f.state.state import PC_MASK, RUN, W15_INITIALISED
 from emu.image.model import Image
 from emu.machine import saved_state
@@ -222,7 +222,7 @@ class Machine(StateAccess):
                         engine.run(cycle)
                 else:
                     engine.run(cycle)
-            except Breakpoint as word:
+            except DebuggerWord as word:
                 stop = self._diagnosed(Stop("breakpoint", state.pc - 2, state.cycle, str(word)))
             except DeviceReset as reset:
                 stop = self._reset_by(reset)
@@ -364,7 +364,7 @@ class Machine(StateAccess):
                 stop = self._call_hooks() if state.pc in self._pc_hooks.by_address else None
                 if stop is None:
                     self.core.sequencer.execute()
-        except Breakpoint as word:
+        except DebuggerWord as word:
             stop = self._diagnosed(Stop("breakpoint", state.pc - 2, state.cycle, str(word)))
         except DeviceReset as reset:
             stop = self._reset_by(reset)

@@ -50,5 +50,5 @@ class Violation(Exception):
         self.pc: Final = pc
 
 
-class Breakpoint(Exception):
+class DebuggerWord(Exception):
     """The program executed a debugger word; the run stops after it (isa.md §4.1)."""

@@ -26,7 +26,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Final
 
-from emu.dspic30f.exceptions.faults import Breakpoint, DeviceReset, IllegalOpcode, TrapConflict
+from emu.dspic30f.exceptions.faults import DebuggerWord, DeviceReset, IllegalOpcode, TrapConflict
 from emu.dspic30f.exceptions.interrupts import Exceptions
 from emu.dspic30f.exceptions.power import PowerSaving, Sleeping
 from emu.dspic30f.interpreter import flow_rules
@@ -132,14 +132,14 @@ class Sequencer:
     # Instructions
 
     def fetch(self, pc: int) -> Step:
-        """Return the decoded instruction at `pc`. Raises IllegalOpcode, or Breakpoint for a debugger word."""
+        """Return the decoded instruction at `pc`. Raises IllegalOpcode, or DebuggerWord for a debugger word."""
         step = self._steps.get(pc)
         if step is None:
             word1 = self.program.word(pc)
             insn = decode_for_execution(word1, self.program.word(pc + 2 & PC_MASK))
             if insn is None:
                 if is_debug_word(word1):
-                    raise Breakpoint(f"debugger word {word1:06X}")
+                    raise DebuggerWord(f"debugger word {word1:06X}")
                 raise IllegalOpcode(word1)
             step = self._steps[pc] = Step(insn, facts_of(insn), pc + 2 * insn.words & PC_MASK)
         return step
@@ -147,7 +147,7 @@ class Sequencer:
     def execute(self) -> None:
         """Execute the instruction at PC, from its stall to its last cycle.
 
-        Raises DeviceReset, with PC at the faulting instruction. Raises Breakpoint, with PC and cycle after the word.
+        Raises DeviceReset, with PC at the faulting instruction. Raises DebuggerWord, with PC and cycle after the word.
         """
         state = self.state
         pc = state.pc
@@ -156,7 +156,7 @@ class Sequencer:
             return
         try:
             step = self.fetch(pc)
-        except Breakpoint:
+        except DebuggerWord:
             state.pc = pc + 2
             state.cycle += 1
             state.stall = 0

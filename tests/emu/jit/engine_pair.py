@@ -21,7 +21,7 @@ from straight_firmware import straight_firmware
 
 from emu.chips.chip import Chip
 from emu.chips.dspic30f6014a import DSPIC30F6014A
-from emu.dspic30f.exceptions.faults import Breakpoint, IllegalOpcode
+from emu.dspic30f.exceptions.faults import DebuggerWord, IllegalOpcode
 from emu.dspic30f.isa.flow import Branch, Return, Skip, Sleep
 from emu.dspic30f.jit.compiler import Compiler, LoadedCode
 from emu.dspic30f.jit.engine import JitEngine
@@ -220,7 +220,7 @@ class InstructionObserver:
     def _step(self, pc: int) -> Any:
         try:
             return self.plain.core.sequencer.fetch(pc) if self.plain.program.executable(pc) else None
-        except (IllegalOpcode, Breakpoint):
+        except (IllegalOpcode, DebuggerWord):
             return None
 
     def native_now(self) -> set[int]:
