@@ -39,7 +39,7 @@ EXTRAS: Final = {
 
 
 @dataclass(frozen=True, slots=True)
-class Program:
+class ExternalProgram:
     """An external program: its names, its Debian package, and the feature that needs it."""
 
     names: tuple[str, ...]
@@ -49,21 +49,23 @@ class Program:
 
 
 PROGRAMS: Final = (
-    Program(("make",), "make", "building applications with the kernel", is_needed=True),
-    Program(("cmake",), "cmake", "projects built with CMake"),
-    Program(("gcc",), "gcc", "the kernel on this host: make TARGET=posix"),
-    Program(("avr-gcc",), "gcc-avr", "the kernel on a Kilobot: make PORT=avr (also avr-libc)"),
-    Program(("arm-none-eabi-gcc",), "gcc-arm-none-eabi", "an e-puck2: PORT=cortex_m (also libnewlib-arm-none-eabi)"),
-    Program(
+    ExternalProgram(("make",), "make", "building applications with the kernel", is_needed=True),
+    ExternalProgram(("cmake",), "cmake", "projects built with CMake"),
+    ExternalProgram(("gcc",), "gcc", "the kernel on this host: make TARGET=posix"),
+    ExternalProgram(("avr-gcc",), "gcc-avr", "the kernel on a Kilobot: make PORT=avr (also avr-libc)"),
+    ExternalProgram(
+        ("arm-none-eabi-gcc",), "gcc-arm-none-eabi", "an e-puck2: PORT=cortex_m (also libnewlib-arm-none-eabi)"
+    ),
+    ExternalProgram(
         ("riscv64-unknown-elf-gcc",),
         "gcc-riscv64-unknown-elf",
         "a RISC-V: PORT=riscv (also picolibc-riscv64-unknown-elf)",
     ),
-    Program(("xc16-gcc",), "", "make TOOLCHAIN=xc16, Microchip's compiler; not in Debian"),
-    Program(("ffmpeg",), "ffmpeg", "films as MP4 without the extra `film`"),
-    Program(("chromium", "chromium-browser", "google-chrome"), "chromium", "tests of the pages people look at"),
-    Program(("gtkwave",), "gtkwave", "looking at waveforms of `emu run --vcd`"),
-    Program(("genhtml",), "lcov", "coverage as pages, from `emu coverage --lcov`"),
+    ExternalProgram(("xc16-gcc",), "", "make TOOLCHAIN=xc16, Microchip's compiler; not in Debian"),
+    ExternalProgram(("ffmpeg",), "ffmpeg", "films as MP4 without the extra `film`"),
+    ExternalProgram(("chromium", "chromium-browser", "google-chrome"), "chromium", "tests of the pages people look at"),
+    ExternalProgram(("gtkwave",), "gtkwave", "looking at waveforms of `emu run --vcd`"),
+    ExternalProgram(("genhtml",), "lcov", "coverage as pages, from `emu coverage --lcov`"),
 )
 
 
