@@ -161,7 +161,7 @@ def other_emulators(folder: Path, repeat: int) -> tuple[dict[str, float], list[s
     notes = []
     for name, command in EMULATORS.items():
         if not shutil.which(name) or not shutil.which("avr-gcc"):
-            notes.append(f"{name}: left out, install the Debian packages gcc-avr avr-libc simavr qemu-system-misc")
+            notes.append(f"{name}: omitted, install the Debian packages gcc-avr avr-libc simavr qemu-system-misc")
             continue
         few, many = (20, 200) if name == "simavr" else (100, 2000)
         images = avr_image(folder, few), avr_image(folder, many)

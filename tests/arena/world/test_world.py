@@ -146,7 +146,7 @@ def test_without_slip_limit_the_drive_is_enkis(empty: Scene) -> None:
 
 @pytest.mark.parametrize(("quantum_ms", "thrust_n"), [(1.0, 1.0), (10.0, 1.0), (10.0, math.inf)])
 def test_objects_at_rest_out_of_the_solver_change_no_position(quantum_ms: float, thrust_n: float) -> None:
-    """If objects at rest are left out of the solver, all positions are equal to the bit, for robots that push crowded
+    """If objects at rest are omitted from the solver, all positions are equal to the bit, for robots that push crowded
     objects and bodies moved by hand."""
     scene = load_scene("clustering").with_values(
         arena__width_cm=100.0, arena__height_cm=80.0, robots__count=4, robots__thrust_n=thrust_n, objects__count=14,

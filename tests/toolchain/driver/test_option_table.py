@@ -20,7 +20,7 @@ VALUES = {"-mcpu=<device>": "-mcpu=30F4013", "-p<device>": "-p30F4013", "-O[<lev
 
 
 def parsed(words: list[str], folder: Path) -> CcOptions:
-    """Options of a command line with one source; `output` and `inputs` are left out of comparisons."""
+    """Options of a command line with one source; `output` and `inputs` are not compared."""
     source = folder / "main.c"
     source.touch()
     return replace(parse([*words, str(source)]), inputs=[], output=None)

@@ -173,7 +173,7 @@ def test_linking_is_repeatable(image):
     assert first == second
 
 
-def test_the_map_lists_symbols_with_sizes_and_what_was_left_out(image):
+def test_the_map_lists_symbols_with_sizes_and_discarded_sections(image):
     """The map lists symbols with sizes, memory use, discarded sections and data records."""
     from toolchain.link.mapfile import map_text
 
