@@ -125,6 +125,6 @@ ROWS: Final = (*_ARITHMETIC, *_BRANCHES, *_BITS, *_MOVES, *_CONTROL)
 """All instruction forms. A word matches at most one of them."""
 
 ERASED: Final = 0xFFFF
-"""Word of erased flash. It is no instruction of the manual; silicon executes it like `sbrs r31, 7`. UNVERIFIED."""
+"""Word of erased flash. It is no instruction of the manual; silicon executes it like `sbrs r31, 7` (avr.md §1)."""
 ERASED_BITS: Final = 0xFFF7
 """The instruction that an erased word is executed as: `sbrs r31, 7` without its don't-care bit."""

@@ -2,15 +2,32 @@
 
 from __future__ import annotations
 
+import re
+import subprocess
 from itertools import pairwise
+from pathlib import Path
 
-from emu.avr.machine import Atmega328p
+from emu.avr.core.addresses import ADDRESSES
+from emu.avr.machine import VECTORS, Atmega328p
 from emu.boards.kilobot.swarm import KilobotSetup, KilobotSwarm
-from tests.emu.avr.conftest import Build, Machine
+from tests.emu.avr.conftest import Build, Machine, needs
 
 PORTB = 0x25
 AIN0, AIN1 = 9, 10
 END = "cli(); sleep_mode(); for (;;) ;"
+
+
+def test_addresses_and_vectors_are_those_of_the_compiler(tmp_path: Path) -> None:
+    """Every register and every vector has the address that avr-libc's header of the ATmega328P gives it."""
+    needs("avr-gcc")
+    source = tmp_path / "names.c"
+    names = [*ADDRESSES, *(f"{name}_vect_num" for name in VECTORS[1:])]
+    source.write_text("#include <avr/io.h>\n" + "".join(f'"{name}" {name}\n' for name in names))
+    command = ["avr-gcc", "-mmcu=atmega328p", "-E", "-P", str(source)]
+    text = subprocess.run(command, check=True, capture_output=True, text=True).stdout
+    found = {name: sum(int(number, 0) for number in re.findall(r"\b(?:0x[0-9a-fA-F]+|[0-9]+)\b", value))
+             for name, value in re.findall(r'^"(\w+)" (.*)$', text, re.MULTILINE)}  # fmt: skip
+    assert found == ADDRESSES | {f"{name}_vect_num": n for n, name in enumerate(VECTORS) if n}
 
 
 def run(machine: Machine, body: str, globals_: str = "") -> Atmega328p:
