@@ -173,6 +173,7 @@ def test_bad_input_is_json(program: str, words: str, capsys: pytest.CaptureFixtu
     assert json.loads(said.out)["error"]["message"] == said.err.strip()
 
 
+@pytest.mark.slow
 def test_errors_in_sources_are_json(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Where the compiler reports errors, `prove` and `program` print an error object."""
     source = tmp_path / "bad.c"
@@ -182,6 +183,7 @@ def test_errors_in_sources_are_json(tmp_path: Path, capsys: pytest.CaptureFixtur
         assert problems(ERROR, json.loads(capsys.readouterr().out)) == []
 
 
+@pytest.mark.slow
 def test_emu_outputs(run: Callable[..., Any], images: dict[str, str], capsys: pytest.CaptureFixture[str]) -> None:
     """Outputs of `emu` for images without the kernel."""
     assert run("emu", "run {hello} --stats --seconds 1")["uart1"] == "hello"
@@ -202,6 +204,7 @@ def test_emu_outputs(run: Callable[..., Any], images: dict[str, str], capsys: py
     assert "--dump-native" in json.loads(capsys.readouterr().out)["error"]["message"]
 
 
+@pytest.mark.slow
 def test_emu_outputs_with_the_kernel(run: Callable[..., Any]) -> None:
     """Footprint and cycles of an application, and their comparison with a baseline."""
     run("emu", "footprint {kernel} --seconds 0.02 --update {folder}/footprint.json")
@@ -212,6 +215,7 @@ def test_emu_outputs_with_the_kernel(run: Callable[..., Any]) -> None:
         assert all(row["difference"] == 0 for row in checked["check"]["rows"])
 
 
+@pytest.mark.slow
 def test_toolchain_outputs(run: Callable[..., Any]) -> None:
     """Sizes, symbols and bounds; a limit that does not hold is in the JSON object."""
     run("toolchain", "size {hello}")
@@ -220,6 +224,7 @@ def test_toolchain_outputs(run: Callable[..., Any]) -> None:
     assert [(one["name"], one["unit"], one["limit"]) for one in bounds["exceeded"]] == [("main", "cycles", 1)]
 
 
+@pytest.mark.slow
 def test_arena_outputs(run: Callable[..., Any], monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """Keys, the channel, and runs of scripted robots."""
     monkeypatch.chdir(tmp_path)
@@ -233,6 +238,7 @@ def test_arena_outputs(run: Callable[..., Any], monkeypatch: pytest.MonkeyPatch,
     run("arena", "compare {folder}/one {folder}/one --at 1")
 
 
+@pytest.mark.slow
 def test_openswarm_outputs(run: Callable[..., Any]) -> None:
     """The state of the installation, and the size of the cache."""
     run("openswarm", "doctor")
