@@ -1,4 +1,4 @@
-"""Stacks and requests to switch on the ports: overflows of threads, main and handlers, superfluous requests."""
+"""Stacks and requests to switch on the ports: overflows, faults before the kernel, superfluous requests."""
 
 from __future__ import annotations
 
@@ -177,6 +177,25 @@ def test_an_overflow_of_the_kernel_stack_stops_the_system(target: str, tmp_path:
         assert said_in_qemu(target, image, rb" in thread \d+\r\n").startswith(b"stack trap at 0x")
     else:
         assert last_words(target, image).startswith(b"stack trap at 0x0:0 in thread ")
+
+
+EARLY = r"""
+#include <openswarm.h>
+int main(void)
+{
+    Sys_Assertion_Failed("early.c", 7);
+    return 0;
+}
+"""
+
+
+@pytest.mark.parametrize("target", BOARDS)
+def test_a_fault_before_the_kernel_names_main(target: str, tmp_path: Path) -> None:
+    """A report before Sys_Init_Kernel() names thread 0, although no thread exists yet."""
+    (tmp_path / "early").mkdir()
+    (tmp_path / "early" / "main.c").write_text(EARLY)
+    image = make(target, "early", tmp_path / "out", apps=tmp_path)
+    assert said_in_qemu(target, image, rb"thread \d+\r\n") == b"early.c:7 in thread 0\r\n"
 
 
 # ---- Requests -------------------------------------------------------------------------------------------------------

@@ -109,6 +109,9 @@ Reset_Handler:
         it      lo
         strlo   r2, [r0], #4
         blo     2b
+        ldr     r0, =os_system          @ reports of faults before Sys_Init_Kernel() read it, too
+        ldr     r1, =os_running
+        str     r0, [r1]
         bl      board_clock
         bl      main
         b       hal_stop
