@@ -15,7 +15,7 @@ and `CURVES`. It may define `MEASURES`, `PUBLISHED`, `groups(scene, objects)`, a
 >>> [measure.name for measure in experiment.measures]   # of type Measure
 ['share', 'share_12cm', 'area', 't80']
 
-`metrics` gets a `Sample`; `Experiment.series` takes the `TrialSamples` of a trial, which contain its `UartLine`s.
+`metrics` gets a `Sample`; `Experiment.series` takes the `TrialSamples` of a trial, with `UartLine`s and `LedEvent`s.
 """
 
 from __future__ import annotations
@@ -99,6 +99,14 @@ class UartLine(NamedTuple):
     text: str
 
 
+class LedEvent(NamedTuple):
+    """A change of a robot's LEDs at `seconds`; `leds` as in a record (arena/README.md)."""
+
+    robot: int
+    seconds: float
+    leds: int
+
+
 @dataclass(frozen=True)
 class TrialSamples:
     """All samples of a trial: `robots` is samples x n x 3 (cm, cm, rad), `objects` samples x n x 2 (cm)."""
@@ -110,6 +118,15 @@ class TrialSamples:
     noted: Mapping[str, Floats]
     uart_lines: Sequence[UartLine] = ()
     """Lines that the robots sent on UART1, in order of time."""
+    led_changes: Sequence[LedEvent] = ()
+    """Changes of LEDs, in order of time."""
+
+    def led_states(self) -> NDArray[np.int64]:
+        """Return the LEDs of each robot at every sample: samples x robots."""
+        found = np.zeros(self.robots.shape[:2], dtype=np.int64)
+        for one in self.led_changes:
+            found[int(np.searchsorted(self.times, one.seconds)) :, one.robot] = one.leds
+        return found
 
 
 def _do_nothing(_world: Any) -> None:

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from arena.camera.appearance import NOTHING, OBJECT, ROBOT
-from arena.experiments import Experiment, TrialSamples, UartLine, experiment_of, loaded_experiment
+from arena.experiments import Experiment, LedEvent, TrialSamples, UartLine, experiment_of, loaded_experiment
 from arena.experiments.declaration import CURVE_COLUMN, SHAPE, declared_experiment
 from arena.metrics import MetricSeries
 from arena.scene.loader import FCY, Scene, scene_of
@@ -165,7 +165,10 @@ class Trial:
         heard = [UartLine(line["robot"], line["cycle"] / FCY, line["text"]) for line in lines]
         heard.sort(key=lambda one: one.seconds)
         robots = np.concatenate([self.robots, turned], axis=2)
-        return TrialSamples(self.times, robots, self.objects, self.scene, noted, heard)
+        lights = [change for sample in self.columns.get("lights", []) for change in sample or ()]
+        shown = [LedEvent(change["robot"], change["cycle"] / FCY, change["leds"]) for change in lights]
+        shown.sort(key=lambda one: one.seconds)
+        return TrialSamples(self.times, robots, self.objects, self.scene, noted, heard, shown)
 
     def _places(self, letter: str, count: int) -> NDArray[np.float64]:
         """Return the positions of the bodies whose columns begin with a letter."""
