@@ -16,8 +16,7 @@ from typing import Any, Final, Literal, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from emu.dspic30f.core import Core
-from emu.dspic30f.engines import ONE_INSTRUMENT
+from emu.dspic30f.core import ONE_INSTRUMENT, Core
 from emu.dspic30f.state.state import RUN
 from emu.system.filters import Filter
 

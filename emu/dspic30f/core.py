@@ -17,6 +17,9 @@ from emu.system.events import Events
 from emu.system.program import ProgramMemory
 from emu.system.record import Record
 
+ONE_INSTRUMENT: Final = "one instrument at a time: a profile, coverage, watched numbers or a trace"
+"""Message of an error: two instruments of a core would count or log in the same native code."""
+
 
 class WRegisters:
     """W0..W15 for tools and tests. Writing an element counts as a word write by the program."""

@@ -12,8 +12,6 @@ from emu.system.native_handle import Native, Run
 
 NAMES: Final = ("auto", "jit", "plain")
 """Engine names for `--engine`; `auto` selects the fastest engine that the host supports."""
-ONE_INSTRUMENT: Final = "one instrument at a time: a profile, coverage, watched numbers or a trace"
-"""Message of an error: two instruments would count or log in the same native code."""
 
 
 class Engine(Protocol):

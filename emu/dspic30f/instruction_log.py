@@ -14,8 +14,7 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from emu.dspic30f.core import Core
-from emu.dspic30f.engines import ONE_INSTRUMENT
+from emu.dspic30f.core import ONE_INSTRUMENT, Core
 
 CORE_END: Final = 0x0054
 """First data address after the core's registers (isa.md §2.1)."""

@@ -17,8 +17,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Final
 from weakref import WeakValueDictionary
 
-from emu.dspic30f.core import Core
-from emu.dspic30f.engines import ONE_INSTRUMENT
+from emu.dspic30f.core import ONE_INSTRUMENT, Core
 from emu.dspic30f.isa.builder import Context
 from emu.dspic30f.isa.codec import decode_for_execution
 from emu.dspic30f.isa.facts import facts_of
