@@ -8,6 +8,7 @@ import math
 import sys
 from collections.abc import Callable
 from dataclasses import asdict
+from pathlib import Path
 from typing import Final, Protocol
 
 from emu.host.errors import report_error
@@ -15,10 +16,11 @@ from emu.host.exit_status import DONE, FAULT
 from emu.image.loader import load_image
 from emu.image.model import Image
 from openswarm.commands import made_parser
+from openswarm.flashing.authentication import authenticated, key_row, read_key
 from openswarm.flashing.boot_session import BootSession, RobotError
 from openswarm.flashing.loaders import BAUD, LOADERS
 from openswarm.flashing.program import Program, is_program, program_of
-from openswarm.flashing.rows import checked, rows, unwritten_parts
+from openswarm.flashing.rows import Row, checked, rows, unwritten_parts
 from openswarm.flashing.serial import SerialPort
 from openswarm.flashing.spreading import HostNeighbour
 
@@ -34,6 +36,9 @@ robot waits in its boot loader: run the command again.
 A program built by `openswarm program` needs no reset: the command sends it to a robot whose running firmware has
 `DEVICES := update`. The robot checks and activates it and passes it on to its neighbours (docs/programs.md).
 
+With --key FILE, firmware with `DEVICES := update update_auth` gets the key of the swarm, and a program gets the tag
+without which such robots refuse it. FILE has 32 hexadecimal digits and mode 0600; the key is never printed.
+
 Exit status: 0 written, every row acknowledged, 1 the robot does not answer or refuses it, 2 bad image or port."""
 
 
@@ -47,6 +52,7 @@ def parser() -> argparse.ArgumentParser:
         help=f"time to wait for an answer of the boot loader or of the running robot (default {WAIT_SECONDS:g})",
     )  # fmt: skip
     made.add_argument("--store", action="store_true", help="programs only: store without activation")
+    made.add_argument("--key", type=Path, metavar="FILE", help="key of the swarm, for firmware with update_auth")
     made.add_argument("--json", action="store_true", help="print the result as JSON")
     return made
 
@@ -64,14 +70,17 @@ def _seconds(text: str) -> float:
 def run(options: argparse.Namespace) -> int:
     """Flash the image; return the exit status. Raises ValueError or OSError for a bad image or port."""
     image = load_image(options.image)
+    key = None if options.key is None else read_key(options.key)
     if is_program(image):
-        return _with_robot(options, _Spreading(options, program_of(image)))
+        program = program_of(image)
+        return _with_robot(options, _Spreading(options, program if key is None else authenticated(program, key)))
     if options.store:
         raise ValueError(f"{image.path}: --store is for programs that `openswarm program` has built")
     checked(image)
+    keys = [] if key is None else [key_row(image, key)]
     for what in unwritten_parts(image):
         print(f"openswarm flash: note: {what} of the image are not written; a programmer does that", file=sys.stderr)
-    return _with_robot(options, _Loading(options, image))
+    return _with_robot(options, _Loading(options, image, keys))
 
 
 class _Job(Protocol):
@@ -101,13 +110,14 @@ class _Loading:
     hint = ": press reset"
     keeps = "the robot waits in its boot loader"
 
-    def __init__(self, options: argparse.Namespace, image: Image) -> None:
+    def __init__(self, options: argparse.Namespace, image: Image, keys: list[Row]) -> None:
         self._options: Final = options
         self._image: Final = image
+        self._keys: Final = keys
 
     def converse(self, line: SerialPort, progress: Callable[[int, int], None]) -> None:
         self._session = BootSession(line, self._options.wait)
-        self._rows = rows(self._image, self._session.loader)
+        self._rows = rows(self._image, self._session.loader, self._keys)
         self._session.write(self._rows, progress)
         self._session.start()
 

@@ -27,6 +27,8 @@ class Program:
     version: int
     rows: tuple[bytes, ...]
     """Rows of ROW_BYTES each."""
+    unused: int = 0
+    """Number of bytes at the end of the last row that the program does not use."""
 
     @property
     def crc(self) -> int:
@@ -56,6 +58,8 @@ def program_of(image: Image) -> Program:
         )
     end = max(block.end for block in image.blocks)
     words = [image.word(address) for address in range(SLOT.start, end, 2)]
-    words += [None] * (-len(words) % ROW_WORDS)
+    unused = 3 * (-len(words) % ROW_WORDS)
+    words += [None] * (unused // 3)
     data = b"".join((ERASED if word is None else word).to_bytes(3, "little") for word in words)
-    return Program(version.address, tuple(data[at : at + ROW_BYTES] for at in range(0, len(data), ROW_BYTES)))
+    rows = tuple(data[at : at + ROW_BYTES] for at in range(0, len(data), ROW_BYTES))
+    return Program(version.address, rows, unused)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from array import array
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Final
 
 from emu.image.model import ERASED, Image
@@ -36,8 +36,10 @@ def checked(image: Image) -> None:
         )
 
 
-def rows(image: Image, loader: Loader) -> list[Row]:
+def rows(image: Image, loader: Loader, further: Sequence[Row] = ()) -> list[Row]:
     """Return the rows to write, in order. Raises ValueError if the image has words at the loader's addresses.
+
+    `further` rows are outside of the image, such as the key of the swarm.
 
     1. The entry's row without the GOTO. Its four erased words are NOPs that lead into the loader, so that a robot whose
     transfer is interrupted waits in its loader at every start.
@@ -66,7 +68,7 @@ def rows(image: Image, loader: Loader) -> list[Row]:
     used = {address // ROW_UNITS * ROW_UNITS for address, _ in image.words(flash)} - {loader.entry_row}
     order = [row(loader.entry_row), *(row(address) for address in sorted(used) if address < loader.start)]
     words[first : first + 2] = array("I", entry)
-    return [*order, row(loader.entry_row)]
+    return [*order, *further, row(loader.entry_row)]
 
 
 def unwritten_parts(image: Image) -> Iterator[str]:

@@ -1,5 +1,4 @@
-/* Robots that reprogram each other by infra-red, and accept programs from a host on UART1 (README.md). One thread
- * manages the stores and sends; handlers queue the received messages for it. */
+/* Robots that reprogram each other or take programs from a host (README.md): a thread sends, handlers queue messages */
 #include <openswarm.h>
 #include <openswarm_infrared.h>
 #include <openswarm_io.h>
@@ -9,7 +8,8 @@
 #include "lamp.h" /* rows of lamp/main.c */
 #include "spread.h"
 
-enum { LOOK_MS = 20, HEARD = 16, CONFIRM_MS = 1000, RESTART_MS = 3000, OFFER_MS = 8000, LINE = 24, STACK = 700 };
+enum { LOOK_MS = 20, HEARD = 16, CONFIRM_MS = 1000, RESTART_MS = 3000, OFFER_MS = 8000, LINE = 24 };
+enum { STACK = 300 + SYS_UPDATE_STACK };
 
 static uint8 messages[HEARD][SYS_SPREAD_BYTES];
 static volatile uint8 first, last; /* indices of the queued messages */

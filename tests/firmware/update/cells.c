@@ -8,6 +8,8 @@
 #include <stdio.h>
 #include <stdlib.h>
 
+#include "tags.c"
+
 enum { PROGRAMS = 14, SLOTS = HAL_UPDATE_STORES + 1, NEVER = 1 << 30 };
 
 static struct {
@@ -17,6 +19,7 @@ static struct {
 
 static uint8 cells[SLOTS][HAL_UPDATE_ROWS + 1][HAL_UPDATE_ROW];
 static uint16 flags[HAL_UPDATE_STORES];
+static uint16 kept_versions[HAL_UPDATE_CELLS];
 static jmp_buf power_off;
 static int cut_in, history;
 static const uint8 *stuck; /* a row with one byte that cannot change */
@@ -111,6 +114,25 @@ void hal_update_renew(uint8_t store)
     operated();
 }
 
+static void change_version(uint8 cell, uint16 to)
+{
+    uint16 bits = cut_in == 0 ? (uint16)chance(65536) : 0xFFFF;
+    kept_versions[cell] = (uint16)((kept_versions[cell] & ~bits) | (to & bits));
+    changes++;
+    operated();
+}
+
+uint16_t hal_update_cell(uint8_t cell)
+{
+    return kept_versions[cell];
+}
+
+void hal_update_set_cell(uint8_t cell, uint16_t value)
+{
+    change_version(cell, 0xFFFF);
+    change_version(cell, value);
+}
+
 void hal_update_run(void)
 {
     bool is_whole_one = false;
@@ -121,19 +143,30 @@ void hal_update_run(void)
     calls++;
 }
 
+/* Adds tag and CRC to a program. */
+static void finish(int n)
+{
+    sys_update *facts = &programs[n].facts;
+    add_tag(facts->version, facts->rows, programs[n].rows);
+    facts->crc = 0xFFFFFFFFu;
+    for (uint8 r = 0; r < facts->rows; r++) {
+        facts->crc = Sys_Add_UpdateCrc(facts->crc, programs[n].rows[r], HAL_UPDATE_ROW);
+    }
+    facts->crc = ~facts->crc;
+}
+
 static void draw_programs(void)
 {
     for (int n = 0; n < PROGRAMS; n++) {
         uint8 least = n == PROGRAMS - 1 ? 3 : 1; /* several rows: can be interrupted */
         uint8 rows = (uint8)(least + chance(chance(4) != 0 ? 4 : HAL_UPDATE_ROWS + 1u - least));
-        uint32 crc = 0xFFFFFFFFu;
         for (uint8 r = 0; r < rows; r++) {
             for (int i = 0; i < HAL_UPDATE_ROW; i++) {
                 programs[n].rows[r][i] = (uint8)chance(256);
             }
-            crc = Sys_Add_UpdateCrc(crc, programs[n].rows[r], HAL_UPDATE_ROW);
         }
-        programs[n].facts = (sys_update){(uint16)(1 + n / 2), rows, ~crc};
+        programs[n].facts = (sys_update){(uint16)(1 + n / 2), rows, 0};
+        finish(n);
     }
 }
 
@@ -156,5 +189,6 @@ static void begin_history(bool with_stuck_bytes)
     cut_in = NEVER;
     memset(cells, 0xFF, sizeof cells);
     memset(flags, 0xFF, sizeof flags);
+    memset(kept_versions, 0xFF, sizeof kept_versions);
     draw_programs();
 }

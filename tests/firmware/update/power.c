@@ -7,11 +7,14 @@
 #include <stdio.h>
 #include <stdlib.h>
 
+#include "tags.c"
+
 enum { NOT_DONE, DONE, TORN, MODES, SLOTS = HAL_UPDATE_STORES + 1, NEVER = 1 << 30 };
 
 typedef struct {
     uint8 rows[SLOTS][HAL_UPDATE_ROWS + 1][HAL_UPDATE_ROW];
     uint16 flags[HAL_UPDATE_STORES];
+    uint8 versions[HAL_UPDATE_CELLS][2];
 } cells;
 
 static cells now;
@@ -102,6 +105,17 @@ void hal_update_clear(uint8_t store, uint16_t bits)
 void hal_update_renew(uint8_t store)
 {
     set_flags(store, 0xFFFF);
+}
+
+uint16_t hal_update_cell(uint8_t cell)
+{
+    return (uint16_t)(now.versions[cell][0] | now.versions[cell][1] << 8);
+}
+
+void hal_update_set_cell(uint8_t cell, uint16_t value)
+{
+    change(now.versions[cell], (const uint8[]){0xFF, 0xFF}, 2);
+    change(now.versions[cell], (const uint8[]){(uint8)value, (uint8)(value >> 8)}, 2);
 }
 
 /* The execution slot must contain one of the images, whole. */
@@ -256,6 +270,16 @@ static void roll_back(void)
     check(start() == 3, "and that version taken again");
 }
 
+/* The damage of authenticated updates is a forger's, who knows the CRC. */
+static void forge_crc(sys_update *facts, uint8 (*rows)[HAL_UPDATE_ROW])
+{
+    facts->crc = 0xFFFFFFFFu;
+    for (uint8 row = 0; row < facts->rows; row++) {
+        facts->crc = Sys_Add_UpdateCrc(facts->crc, rows[row], HAL_UPDATE_ROW);
+    }
+    facts->crc = ~facts->crc;
+}
+
 /* Transfers images with every kind of damage and returns how many were refused. */
 static int damaged(int count)
 {
@@ -297,6 +321,9 @@ static int damaged(int count)
             facts.crc ^= 1u << noise() % 32;
             facts.rows = noise() % 4 == 0 ? (uint8)(facts.rows + 1 + noise() % 40) : facts.rows;
         }
+        if (IS_AUTHENTICATED && n % 6 != 5) {
+            forge_crc(&facts, spoilt);
+        }
         bool is_damaged = n % 6 == 5 || memcmp(spoilt, images[2], sizeof spoilt) != 0;
         bool is_taken = Sys_Begin_Update(&facts);
         for (uint8 i = 0; is_taken && i < facts.rows; i++) {
@@ -318,12 +345,15 @@ int main(void)
         for (int i = 0; i < HAL_UPDATE_ROWS * HAL_UPDATE_ROW; i++) {
             images[version][i / HAL_UPDATE_ROW][i % HAL_UPDATE_ROW] = noise();
         }
+        add_tag((uint16)version, rows_of[version], images[version]);
     }
     power(0);
     power(1);
     power(2);
     roll_back();
     rows_of[2] = 9, rows_of[3] = 9;
+    add_tag(2, 9, images[2]);
+    add_tag(3, 9, images[3]);
     int refused = damaged(10500);
     check(refused >= 10000, "enough were damaged");
     printf("%d damaged images refused, %ld checks\n", refused, checks);

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import shutil
 import subprocess
 import sys
 import zlib
@@ -20,6 +19,7 @@ from openswarm.flashing.messages import MESSAGE, PARTS, Advertisement, Request, 
 from openswarm.flashing.messages import data as part_of
 from openswarm.flashing.program import ROWS as SLOT_ROWS
 from openswarm.flashing.program import Program
+from tests.firmware.update.host_programs import on_host
 from tests.watchdog import HANG
 
 HERE = Path(__file__).parent
@@ -93,20 +93,6 @@ def test_host_and_robot_have_one_format(tmp_path):
     asked = Request(program.version, 2, 0x80001, identity(program.crc))
     assert [read(message) for _, message, _ in said[:3]] == [stored, active, asked]
     assert [message for _, message, _ in said[3:]] == [part_of(program, 2, part) for part in range(PARTS)]
-
-
-def on_host(program: str, folder: Path) -> str:
-    """Build and run a program of the folder update; return its output."""
-    if shutil.which("gcc") is None:
-        pytest.skip("the host tests of updates are built with gcc, which is not installed (Debian package gcc)")
-    folders = ("include", "hal", "kernel", "io", "io/update", "port/posix", "board/host")
-    sanitizers = ["-fsanitize=address,undefined", "-fno-sanitize-recover=undefined"]
-    command = ["gcc", "-std=gnu99", "-O1", "-g", "-Wall", "-Wextra", "-Werror", *sanitizers]
-    command += [f"-I{OPENSWARM / folder}" for folder in folders]
-    subprocess.run([*command, str(HERE / f"{program}.c"), "-o", str(folder / program)], check=True)
-    done = subprocess.run([folder / program], capture_output=True, text=True, check=False, timeout=HANG)
-    assert done.returncode == 0, done.stdout + done.stderr
-    return done.stdout
 
 
 class Number:

@@ -2,6 +2,8 @@
 /* Two stores, one of which always keeps the program that works. README.md has the order of writes. */
 #include "update.h"
 
+#include "authentication.h"
+
 #include <string.h>
 
 /* A flag bit is 1 until its step has happened. */
@@ -75,7 +77,7 @@ static bool holds(uint8 store, const sys_update *facts)
         hal_update_read(store, i, row);
         crc = Sys_Add_UpdateCrc(crc, row, HAL_UPDATE_ROW);
     }
-    return (crc ^ 0xFFFFFFFFu) == facts->crc;
+    return (crc ^ 0xFFFFFFFFu) == facts->crc && Sys_Is_UpdateAuthentic(store, facts);
 }
 
 static bool is_whole(uint8 store, sys_update *facts)
@@ -142,11 +144,12 @@ bool Sys_Begin_Update(const sys_update *facts)
 {
     sys_update other;
     uint8 kept = choose(&other);
-    if (!is_possible(facts) || (kept != NONE && !is_confirmed(kept)) || (running != NONE && !is_confirmed(running))) {
+    if (!is_possible(facts) || !Sys_Is_UpdateAllowed(facts->version) || (kept != NONE && !is_confirmed(kept)) || (running != NONE && !is_confirmed(running))) {
         return false; /* also during the last try, which leaves no tries */
     }
     for (uint8 store = 0; store < HAL_UPDATE_STORES; store++) {
-        if (is_whole(store, &other) && facts->version <= other.version) {
+        if (is_whole(store, &other) &&
+            (facts->version <= other.version || !Sys_Keep_UpdateVersion(other.version))) {
             return false;
         }
     }
@@ -157,6 +160,7 @@ bool Sys_Begin_Update(const sys_update *facts)
     target = NONE; /* power may fail below: the update is begun only once all is written */
     missing = 0;
     stored = stored == store ? NONE : stored;
+    Sys_Forget_UpdateTag(store);
     hal_update_erase(store, 0); /* first: an erased head invalidates the store whatever its flags are */
     hal_update_renew(store);
     frozen[store] = 0;

@@ -23,6 +23,13 @@ extern "C" {
 
 enum { SYS_UPDATE_TRIES = 3 }; /* starts without Sys_Confirm_Update */
 
+/* Bytes of the caller's stack that a call may take. */
+#ifdef SYS_UPDATE_AUTH
+enum { SYS_UPDATE_STACK = 680 };
+#else
+enum { SYS_UPDATE_STACK = 400 };
+#endif
+
 typedef struct {
     uint16 version; /* greater than that of all stored programs */
     uint8 rows;     /* 1 to HAL_UPDATE_ROWS */

@@ -1,0 +1,1 @@
+override DEFINES += -DSYS_UPDATE_AUTH

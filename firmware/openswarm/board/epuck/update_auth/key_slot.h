@@ -1,0 +1,10 @@
+/* SPDX-License-Identifier: MIT */
+/* Address of the key: the row before the stores, eight words with two bytes each. openswarm/flashing/authentication.py
+ * repeats it. */
+#ifndef KEY_SLOT_H
+#define KEY_SLOT_H
+
+#define UPDATE_KEY 0x0167C0
+#define UPDATE_KEY_END 0x016800
+
+#endif
