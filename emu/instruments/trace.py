@@ -126,7 +126,7 @@ class Tracer:
         while True:
             at = self._write_lines(ctypes.addressof(self._table), int(entries.ctypes.data), at, count,
                                    int(lines.ctypes.data), len(lines), ctypes.addressof(used))  # fmt: skip
-            self._write(lines[: used.value].tobytes())
+            self._write(lines[: used.value].data)
             if at + 1 >= count:
                 break
             where = int(entries["pc"][at])
@@ -139,13 +139,13 @@ class Tracer:
                 self._provide_text(where)
         self._pending = entries[at:].copy()
 
-    def _write(self, text: bytes) -> None:
+    def _write(self, text: bytes | memoryview) -> None:
         """Write ASCII text to the stream. After a failed write, for example on a full disk, nothing more is written."""
         try:
             if self._binary is not None:
                 self._binary.write(text)
             else:
-                self.stream.write(text.decode())
+                self.stream.write(str(text, "utf-8"))
         except OSError:
             self._has_failed = True
             raise

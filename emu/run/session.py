@@ -22,8 +22,8 @@ if TYPE_CHECKING:
 
 SLICE_SECONDS: Final = 0.02
 """Target host time of a slice in s, which is the maximum delay of output and Ctrl-C."""
-FIRST_SLICE, SHORTEST_SLICE, LONGEST_SLICE = 20_000, 2_000, 100_000_000
-"""Initial, minimum and maximum length of a slice in Tcy."""
+FIRST_SLICE, SHORTEST_SLICE, LONGEST_SLICE = 10_000, 2_000, 100_000_000
+"""Initial, minimum and maximum length of a slice in Tcy. The native engine interprets the first slice."""
 PACED_SLICES_PER_SECOND: Final = 200
 POLL_SECONDS: Final = 0.1
 """Maximum time in s of a wait for input before Ctrl-C is checked."""

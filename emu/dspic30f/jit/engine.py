@@ -63,10 +63,10 @@ if TYPE_CHECKING:
 BLOCK_LEVEL, STEP_LEVEL = 2, 0
 """LLVM optimisation levels for block code and for exact code."""
 
-WARM_UP: Final = 4000
+WARM_UP: Final = 10_000
 """Cycles after power-on that the first machine of a process interprets, in Tcy.
 
-To import the translator takes longer.
+To import the translator and to load the first code takes longer.
 """
 
 COLD_CYCLES: Final = 1000
