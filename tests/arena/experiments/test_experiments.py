@@ -187,7 +187,7 @@ def test_a_wrong_experiment_is_reported_in_one_line(
 def test_experiments_that_are_not_there(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """An unknown experiment name and a missing experiment file are refused."""
     run(tmp_path, scene=SCENE.replace("mine.py", "nothing"), status=2)
-    assert "unknown experiment 'nothing'; known: aggregation, average, avoidance, clocks, " in (capsys.readouterr().err)
+    assert "unknown experiment 'nothing'; known: aggregation, average, avoidance, blinking, " in capsys.readouterr().err
     run(tmp_path, scene=SCENE.replace("mine.py", "lost.py"), status=2)
     assert "lost.py" in capsys.readouterr().err
 
