@@ -1,4 +1,4 @@
-/* Kilobot infrared: the test sets messages to send and reads received ones in variables (test_kilobots.py). */
+/* Kilobot infrared: the test sets messages to send and reads received ones in variables (test_kilobot_pulses.py). */
 #include <openswarm.h>
 #include <openswarm_infrared.h>
 #include <openswarm_remote.h>
