@@ -156,7 +156,7 @@ def test_an_interrupt_withdraws_a_reservation(faulty: tuple[Path, Symbols]) -> N
     20191213, 8.2.
     """
     image, _ = faulty
-    command = ["riscv64-unknown-elf-objdump", "-d", "--no-show-raw-insn", image]
+    command = ["riscv64-unknown-elf-objdump", "-d", "--no-show-raw-insn", str(image)]
     lines = subprocess.run(command, capture_output=True, text=True, check=True).stdout.splitlines()
     code = [line.split("\t")[1] for line in lines if line.count("\t") >= 1]
     returns = [at for at, name in enumerate(code) if name.strip() == "mret"]
