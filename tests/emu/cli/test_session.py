@@ -12,6 +12,7 @@ from programs import ECHO, SPIN, executable
 
 import emu
 import emu.api
+from emu.dspic30f.jit.engine import WARM_UP
 from emu.image.loader import parse_image
 from emu.run import session as sessions
 from emu.run.input_log import TimestampedInput
@@ -46,6 +47,11 @@ def test_slices_do_not_affect_the_run(monkeypatch, length, engine):
     stop, said, state = ended(length, engine)
     assert said == b"ifmmpyz{"
     assert (stop, said, state) == ended(333, "plain")
+
+
+def test_the_first_slice_ends_before_the_translator_is_imported():
+    """Output of the first cycles does not wait for it."""
+    assert sessions.FIRST_SLICE <= WARM_UP
 
 
 def test_a_paced_run_takes_as_long_as_the_robot(monkeypatch):
