@@ -3,7 +3,8 @@
 `python tests/fuzz/emulator/fuzz_inputs.py [--inputs N] [--seed S] [--seconds T] [--format NAME]`; exits with 1 at the
 first input with another outcome. Inputs: scenes, stimuli, recorded input, pictures, baselines, counts, records,
 manifests, bundles, annotations, archives, C sources, option files, states of fault campaigns, and messages of the
-debug protocol. ELF and HEX files are tested by `fuzz_loader.py`, assembly by `fuzz_asm.py`.
+debug protocol, and images as commands read them. `fuzz_loader.py` tests the loader alone with many more ELF and HEX
+files, `fuzz_asm.py` assembly.
 """
 
 from __future__ import annotations
@@ -123,6 +124,8 @@ ram = 4
 register = 2
 flash = 1
 """
+AVR_LOOP = b":02000000FFCF30\n:00000001FF\n"
+"""An instruction of the ATmega328P that jumps to itself."""
 ANNOTATIONS = b"calls main: step, *\ndepth step 40\nrecursion step 3\nthread step\n"
 MOST_MEMORY = 8 << 30
 """Limit of the address space in bytes: an input that needs more memory is a failure."""
@@ -219,7 +222,14 @@ class Bench:
         self.trial = parquet.read_table(self.run / "trial-0001.parquet")
         page = ("arena", "replay", "{}", "--out", str(folder / "page.html"))
         manifest = ((self.run / "manifest.json").read_bytes(), "run/manifest.json")
+        self._must("toolchain", "hex", str(self.image), "-o", str(folder / "program.hex"))
+        elf, hexed = self.image.read_bytes(), (folder / "program.hex").read_bytes()
         self.formats = (
+            Format("ELF listed", elf, "listed.elf", ("emu", "disasm", "{}", "--source"), is_text=False),
+            Format("ELF bounded", elf, "bounded.elf", ("toolchain", "bounds", "{}"), is_text=False),
+            Format("HEX", hexed, "image.hex", ("emu", "info", "{}")),
+            Format("HEX for AVR", AVR_LOOP, "avr.hex",
+                   ("emu", "run", "{}", "--board", "kilobot", "--seconds", "0.0001")),
             Format("scene", SCENE.encode(), "scene.toml",
                    ("arena", "run", "{}", "--minutes", "0.02", *short, str(folder / "out"))),
             Format("stimulus", STIMULUS.encode(), "stimulus.txt", (*run, "--stimulus", "{}")),
