@@ -100,13 +100,13 @@ def test_a_dense_crowd_jams(run: Run, image: Callable[[str], AvrImage]) -> None:
     """Robots that drive into each other touch but do not overlap, and none leaves the walls."""
     image("duties(70, 66);")
     scene = ('[arena]\nwidth_cm = 30\nheight_cm = 30\n[[robots]]\nkind = "kilobot"\nimage = "image.elf"\n'
-             'place = "hexagonal"\ncount = 19\nspacing_cm = 3.4\n')  # fmt: skip
+             'place = "hexagonal"\ncount = 19\nspacing_cm = 3.3\n')  # fmt: skip
     found = run(scene, 6, "--set", "kilobots.speed_cm_s=3")
     places = np.array([[found[f"r{n}_{axis}"][-1] for axis in ("x", "y")] for n in range(19)])
     first = np.array([[found[f"r{n}_{axis}"][0] for axis in ("x", "y")] for n in range(19)])
     apart = np.hypot(*(first[:, None] - first[None]).transpose(2, 0, 1))[~np.eye(19, dtype=bool)]
-    assert apart.min() == pytest.approx(3.4, abs=1e-3)
-    assert (np.sort(apart.reshape(19, 18), axis=1)[:, :6].max(axis=1) < 3.401).sum() == 7, "hexagonal: 7 inner robots"
+    assert apart.min() == pytest.approx(3.3, abs=1e-3)
+    assert (np.sort(apart.reshape(19, 18), axis=1)[:, :6].max(axis=1) < 3.301).sum() == 7, "hexagonal: 7 inner robots"
     gaps = np.hypot(*(places[:, None] - places[None]).transpose(2, 0, 1))[~np.eye(19, dtype=bool)]
     assert gaps.min() > 3.3 - 0.1
     assert np.hypot(*(places - first).T).max() > 1.0
@@ -201,4 +201,4 @@ def test_wrong_values_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture[
     assert "a Kilobot runs the image of a firmware; none is named" in capsys.readouterr().err
     path.write_text('name = "test"\n[[robots]]\nkind = "kilobot"\nimage = "nothing.hex"\n')
     assert main(["run", str(path), "--out", str(tmp_path / "out")]) == 2
-    assert "expected an ELF or HEX file for AVR, or one of gradient, orbit, " in capsys.readouterr().err
+    assert "expected an ELF or HEX file for AVR, or one of edge, gradient, orbit, " in capsys.readouterr().err
