@@ -17,6 +17,8 @@ from arena.scene.schema import ObjectKind, Placed, RobotGroup
 
 Place = tuple[float, ...]
 """Position x, y in cm; of a movable polygon also its heading in rad."""
+ROUNDING_CM: Final = 1e-9
+"""Rounding of distances: bodies may touch, as on a lattice with gaps of their diameter."""
 TRIES: Final = 2000
 """Random positions to try before the scene counts as full."""
 
@@ -94,7 +96,7 @@ def obstruction(
         if one.radius_cm and math.hypot(x - one.x_cm, y - one.y_cm) < radius + one.radius_cm:
             return f"touches obstacle {one.name}".rstrip()
     for other_x, other_y, other in taken:
-        if math.hypot(x - other_x, y - other_y) < radius + other:
+        if math.hypot(x - other_x, y - other_y) < radius + other - ROUNDING_CM:
             return f"touches what is at ({other_x:g}, {other_y:g}) cm"
     return ""
 
