@@ -162,9 +162,9 @@ class HostNeighbour:
                     pass  # skip: the robot repeats messages that arrive meanwhile
 
     def _silence(self, asks: bool) -> str:
-        if self._asked is not None and self._asked.row == len(self._program.rows) - 1 and not asks:
-            return ("the robot has received the program and does not keep it: its flash does not hold, or the program"
-                    " lacks the tag of the robot's key (--key)")  # fmt: skip
+        if self._asked is not None and self._asked.row == len(self._program.rows) - 1:
+            return ("the robot does not keep the program after its last row: the line or its flash is damaged, or the"
+                    " program lacks the tag of the robot's key (--key)")  # fmt: skip
         if self._asked is not None:
             what = "asks again and again for" if asks else "fell silent at"
             return f"the robot {what} row {self._asked.row}: what it has stays there, run the command again"

@@ -15,9 +15,12 @@ import emu
 from emu.image.loader import load_image
 from emu.machine.machine import Machine
 from openswarm.cli import main
+from openswarm.flashing.authentication import KEY_SLOT, authenticated, key_row
 from openswarm.flashing.boot_session import RobotError
-from openswarm.flashing.messages import framed, unframed
+from openswarm.flashing.loaders import LOADERS
+from openswarm.flashing.messages import Advertisement, framed, unframed
 from openswarm.flashing.program import SLOT, Program, program_of
+from openswarm.flashing.rows import rows
 from openswarm.flashing.spreading import HostNeighbour
 from tests.firmware.radio import SLICE, Line
 from tests.json_schemas import validated
@@ -62,15 +65,15 @@ def of(path: Path) -> Program:
     return program_of(load_image(str(path)))
 
 
-def slot(machine: Machine, rows: int) -> bytes:
-    words = [machine.program.word(address) for address in range(SLOT.start, SLOT.start + 64 * rows, 2)]
+def slot(machine: Machine, count: int) -> bytes:
+    words = [machine.program.word(address) for address in range(SLOT.start, SLOT.start + 64 * count, 2)]
     return b"".join(word.to_bytes(3, "little") for word in words)
 
 
 def run_until_stored(robot: Machine, program: Program) -> None:
     """Run until the slot holds the program, at most 4 s."""
-    rows, end = b"".join(program.rows), robot.cycle + 4 * emu.FCY_HZ
-    while slot(robot, ROWS) != rows:
+    stored, end = b"".join(program.rows), robot.cycle + 4 * emu.FCY_HZ
+    while slot(robot, len(program.rows)) != stored:
         assert robot.cycle < end
         robot.run(seconds=0.1)
     robot.run(seconds=0.3)
@@ -93,10 +96,10 @@ def test_a_robot_takes_checks_and_runs_what_the_host_has(robot, programs):
 
     line.write = damage  # type: ignore[method-assign]
     host = HostNeighbour(line, program, 20.0)
-    rows: list[int] = []
-    assert host.give(lambda done, total: rows.append(done)) is False
-    assert rows == sorted(rows)
-    assert {0, 1, 2, 3} == set(rows)
+    received: list[int] = []
+    assert host.give(lambda done, total: received.append(done)) is False
+    assert received == sorted(received)
+    assert {0, 1, 2, 3} == set(received)
     assert host.counts.requests > ROWS
     host.activate()
     run_until_stored(robot, program)
@@ -129,6 +132,42 @@ def test_a_robot_that_falls_silent_is_told(robot, programs):
 
     with pytest.raises(RobotError, match=r"the robot fell silent at row 0: what it has stays there"):
         HostNeighbour(line, program, 5.0).give(cut)
+
+
+class Attacker(HostNeighbour):
+    """A host that does not give up when the robot has a higher version."""
+
+    def _check(self, said: Advertisement) -> None:
+        self._own = said.version
+
+
+@pytest.mark.slow
+def test_a_robot_with_a_key_takes_only_programs_of_its_key(image, programs):
+    """A robot that authenticates programs refuses those without its tag, and an authentic lower version.
+
+    All arrive whole, with right CRCs: a program without a tag, and one that has lost its first rows and kept the tag.
+    """
+    key = bytes(range(1, 17))
+    path = image("spreading", None, "DEVICES=infrared update update_auth")
+    firmware, robot = load_image(str(path)), emu.load(path)
+    row = key_row(firmware, key)
+    written = rows(firmware, LOADERS[0x91], [row])
+    assert row == written[-2]
+    assert [address for address, _ in written].count(KEY_SLOT) == 1
+    for at, word in enumerate(row[1]):
+        robot.program.put(KEY_SLOT + 2 * at, word)
+    line, true = Line(robot), authenticated(of(programs[4]), key)
+    cut = Program(5, true.rows[-1:])
+    for forged in (of(programs[5]), cut):
+        with pytest.raises(RobotError, match=r"does not keep the program after .* tag of the robot's key"):
+            HostNeighbour(line, forged, 4.0).give(lambda done, total: None)
+    assert HostNeighbour(line, true, 4.0).give(lambda done, total: None) is False
+    with pytest.raises(RobotError, match="the robot has version 4 and does not ask for version 3"):
+        Attacker(line, authenticated(Program(3, true.rows), key), 4.0).give(lambda done, total: None)
+    host = HostNeighbour(line, true, 4.0)
+    assert host.give(lambda done, total: None) is False
+    host.activate()
+    run_until_stored(robot, true)
 
 
 def test_damaged_frames_are_none():

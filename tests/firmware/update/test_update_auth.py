@@ -8,9 +8,11 @@ from pathlib import Path
 
 import pytest
 
+import emu
+from emu.image.loader import load_image
 from openswarm.cli import main
 from openswarm.flashing.ascon import tag
-from openswarm.flashing.authentication import KEY_SLOT, authenticated, read_key
+from openswarm.flashing.authentication import KEY_SLOT, authenticated, key_row, read_key
 from openswarm.flashing.loaders import ROW_BYTES
 from openswarm.flashing.program import ROWS, Program
 from tests.firmware.update.host_programs import OPENSWARM, on_host, run_on_host
@@ -148,6 +150,13 @@ def test_a_key_file_is_read_with_its_end_of_line(tmp_path):
     assert read_key(key) == bytes.fromhex("00112233445566778899aabbccddeeff")
     with pytest.raises(ValueError, match="expected a regular file"):
         read_key(tmp_path)
+
+
+def test_firmware_without_the_option_takes_no_key(tmp_path):
+    (tmp_path / "lamp.c").write_text("int main(void) { return 0; }\n")
+    image = load_image(emu.build(tmp_path / "lamp.c", output=tmp_path / "lamp.elf"))
+    with pytest.raises(ValueError, match="keeps no key: expected the ELF file of firmware with DEVICES := update"):
+        key_row(image, bytes(16))
 
 
 def test_host_and_firmware_know_one_key_slot():
