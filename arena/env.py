@@ -64,15 +64,15 @@ class ArenaEnv(ParallelEnv):  # type: ignore[misc]
     simulated seconds and terminated by the experiment's `done`. With `render_mode="rgb_array"`, `render` returns a
     picture of the arena from above.
 
-    >>> from arena.env import ArenaEnv
-    >>> env = ArenaEnv("aggregation", seconds=1.0)
-    >>> observations, _ = env.reset(seed=1)
-    >>> len(observations), observations[env.agents[0]].shape
-    (8, (21,))
-    >>> actions = {agent: (0.5, 0.5) for agent in env.agents}
-    >>> _, rewards, _, truncations, _ = env.step(actions)
-    >>> any(truncations.values())
-    False
+        >>> from arena.env import ArenaEnv
+        >>> env = ArenaEnv("aggregation", seconds=1.0)
+        >>> observations, _ = env.reset(seed=1)
+        >>> len(observations), observations[env.agents[0]].shape
+        (8, (21,))
+        >>> actions = {agent: (0.5, 0.5) for agent in env.agents}
+        >>> _, rewards, _, truncations, _ = env.step(actions)
+        >>> any(truncations.values())
+        False
 
     A pickled or copied environment repeats its episode from the seed and the actions, which gives the same numbers;
     changes by `stage` are not repeated.

@@ -1,12 +1,12 @@
 """Metrics of object positions, each with its definition and source; lengths in cm, times in s.
 
->>> import numpy as np
->>> from arena.metrics import clusters, compactness, reach_of
->>> places = np.array([(0.0, 0.0), (10.0, 0.0), (100.0, 0.0)])
->>> clusters(places, reach_of("4r", radius_cm=5.0))
-[0, 0, 1]
->>> round(compactness(places, radius_cm=5.0), 2)
-60.67
+    >>> import numpy as np
+    >>> from arena.metrics import clusters, compactness, reach_of
+    >>> places = np.array([(0.0, 0.0), (10.0, 0.0), (100.0, 0.0)])
+    >>> clusters(places, reach_of("4r", radius_cm=5.0))
+    [0, 0, 1]
+    >>> round(compactness(places, radius_cm=5.0), 2)
+    60.67
 
 `arena.trial.record.Trial.series` is the MetricSeries of a recorded trial.
 """

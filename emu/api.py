@@ -1,25 +1,25 @@
 """The Python interface: load an image, run it, and inspect it by the names of its source.
 
->>> import emu
->>> machine = emu.load("tests/emu/cli/hello.hex")
->>> output = bytearray()
->>> machine.uart[1].on_byte = lambda byte, cycle: output.append(byte)
->>> stop = machine.run(cycles=14_745_600)       # one second of an e-puck
->>> stop.reason, bytes(output)
-('halt', b'hi!\\n')
->>> machine.w[0], hex(machine.pc), machine.peek("U1BRG")
-(5, '0x11e', 7)
+    >>> import emu
+    >>> machine = emu.load("tests/emu/cli/hello.hex")
+    >>> output = bytearray()
+    >>> machine.uart[1].on_byte = lambda byte, cycle: output.append(byte)
+    >>> stop = machine.run(cycles=14_745_600)       # one second of an e-puck
+    >>> stop.reason, bytes(output)
+    ('halt', b'hi!\\n')
+    >>> machine.w[0], hex(machine.pc), machine.peek("U1BRG")
+    (5, '0x11e', 7)
 
 A snapshot is a copy of the whole state. It is valid in every engine:
 
->>> other = emu.load("tests/emu/cli/hello.hex", engine="plain")
->>> other.run(until=0x104).reason               # also: a name, or a function that returns a condition
-'until'
->>> state = other.snapshot()
->>> _ = other.run()
->>> other.restore(state)
->>> other.run().cycle == stop.cycle
-True
+    >>> other = emu.load("tests/emu/cli/hello.hex", engine="plain")
+    >>> other.run(until=0x104).reason               # also: a name, or a function that returns a condition
+    'until'
+    >>> state = other.snapshot()
+    >>> _ = other.run()
+    >>> other.restore(state)
+    >>> other.run().cycle == stop.cycle
+    True
 """
 
 from __future__ import annotations
@@ -53,10 +53,10 @@ if TYPE_CHECKING:
 class Machine(BareMachine):
     """A machine with a debugger attached: access by source names, and stops that explain firmware faults.
 
-    >>> import emu
-    >>> machine = emu.load("tests/emu/cli/hello.hex")
-    >>> machine.run().reason, machine.var("U1BRG * 2"), machine.threads()
-    ('halt', 14, [])
+        >>> import emu
+        >>> machine = emu.load("tests/emu/cli/hello.hex")
+        >>> machine.run().reason, machine.var("U1BRG * 2"), machine.threads()
+        ('halt', 14, [])
 
     With `strict`, null pointers, uninitialised reads and stores into other threads' stacks are faults
     (emu/debug/strict.py); this needs the plain engine. The other arguments are those of `emu.machine.machine.Machine`.
@@ -275,12 +275,14 @@ class BuildError(RuntimeError):
 
 
 class Change(NamedTuple):
-    """Change of a watched value. The instruction that ended before `cycle` made it; `pc` is the next instruction.
+    """Change of a watched value.
 
-    >>> import emu
-    >>> first = next(emu.watch(emu.load("tests/emu/cli/hello.hex"), "U1BRG"))
-    >>> first.old, first.new
-    (0, 7)
+        >>> import emu
+        >>> first = next(emu.watch(emu.load("tests/emu/cli/hello.hex"), "U1BRG"))
+        >>> first.old, first.new
+        (0, 7)
+
+    The instruction that ended before `cycle` (Tcy) made the change; `pc` is the next instruction.
     """
 
     cycle: int

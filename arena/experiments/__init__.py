@@ -6,14 +6,14 @@ and `CURVES`. It may define `MEASURES`, `PUBLISHED`, `groups(scene, objects)`, a
 `builtin/foraging.py` one with a supervisor. Installed packages register modules under the entry point
 `openswarm.experiments`.
 
->>> from arena.experiments import experiment_of
->>> experiment = experiment_of("clustering")            # an Experiment
->>> [curve.name for curve in experiment.curves]         # of type Curve
-['share', 'share_12cm', 'compactness']
->>> experiment.curves[0].shown(0.95)
-'95 %'
->>> [measure.name for measure in experiment.measures]   # of type Measure
-['share', 'share_12cm', 'area', 't80']
+    >>> from arena.experiments import experiment_of
+    >>> experiment = experiment_of("clustering")            # an Experiment
+    >>> [curve.name for curve in experiment.curves]         # of type Curve
+    ['share', 'share_12cm', 'compactness']
+    >>> experiment.curves[0].shown(0.95)
+    '95 %'
+    >>> [measure.name for measure in experiment.measures]   # of type Measure
+    ['share', 'share_12cm', 'area', 't80']
 
 `metrics` gets a `Sample`; `Experiment.series` takes the `TrialSamples` of a trial, with `UartLine`s and `LedEvent`s.
 """

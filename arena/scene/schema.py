@@ -1,11 +1,13 @@
 """The tables of a scene: meaning, default and limits of each value. Pure data.
 
->>> from arena.scene.loader import load_scene
->>> scene = load_scene("clustering")
->>> scene.robots.count, scene.arena.width_cm
-(5, 400.0)
->>> scene.with_values(robots__count=3).robots.count
-3
+    >>> from arena.scene.loader import load_scene
+    >>> scene = load_scene("clustering")
+    >>> scene.robots.count, scene.arena.width_cm
+    (5, 400.0)
+    >>> scene.with_values(robots__count=3).robots.count
+    3
+
+docs/scene-keys.md lists all keys.
 """
 
 from __future__ import annotations

@@ -63,17 +63,19 @@ class Columns(dict[str, Any]):
 
 @dataclass(frozen=True)
 class Trial:
-    """One recorded trial. docs/experiment-appendix.md explains `columns`; `about` is the metadata.
+    """One recorded trial.
 
-    >>> from pathlib import Path
-    >>> from arena.trial.record import trials_in
-    >>> trial = trials_in(Path("build/study"))[0]      # of `arena run clustering --out build/study`
-    >>> trial.about["seed"], float(trial.times[0]), trial.robots[0, 0].shape     # x, y in cm
-    (1, 0.0, (2,))
-    >>> "r0_x" in trial.columns                         # of type Columns
-    True
-    >>> 0 < trial.series.last("share") <= 1
-    True
+        >>> from pathlib import Path
+        >>> from arena.trial.record import trials_in
+        >>> trial = trials_in(Path("build/study"))[0]      # of `arena run clustering --out build/study`
+        >>> trial.about["seed"], float(trial.times[0]), trial.robots[0, 0].shape     # x, y in cm
+        (1, 0.0, (2,))
+        >>> "r0_x" in trial.columns                         # of type Columns
+        True
+        >>> 0 < trial.series.last("share") <= 1
+        True
+
+    docs/experiment-appendix.md explains `columns`; `about` is the metadata.
     """
 
     path: Path

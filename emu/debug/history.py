@@ -65,19 +65,21 @@ def position(machine: Machine) -> tuple[int, int]:
 
 
 class History:
-    """Recorder of `machine`. From its creation on, `advance` and `step` of this class must run the machine.
+    """Recorder of `machine`.
 
-    >>> import emu
-    >>> from emu.debug.history import History
-    >>> machine = emu.load("firmware.elf")
-    >>> history = History(machine)
-    >>> history.advance(200_000)               # no stop before the limit, in Tcy
-    >>> write = history.last_write(machine.address_of("count"), 2)     # a Write; states are kept as StoredState
-    >>> machine.cycle == write.cycle, int.from_bytes(write.new, "little") - int.from_bytes(write.old, "little")
-    (True, 1)
-    >>> history.step_back(), history.is_past
-    (True, True)
-    >>> history.seek(history.end)
+        >>> import emu
+        >>> from emu.debug.history import History
+        >>> machine = emu.load("firmware.elf")
+        >>> history = History(machine)
+        >>> history.advance(200_000)               # no stop before the limit, in Tcy
+        >>> write = history.last_write(machine.address_of("count"), 2)     # a Write; states are kept as StoredState
+        >>> machine.cycle == write.cycle, int.from_bytes(write.new, "little") - int.from_bytes(write.old, "little")
+        (True, 1)
+        >>> history.step_back(), history.is_past
+        (True, True)
+        >>> history.seek(history.end)
+
+    From its creation on, `advance` and `step` of this class must run the machine.
     """
 
     def __init__(self, machine: Machine, *, period: int = PERIOD, max_states: int = MAX_STATES) -> None:

@@ -1,15 +1,17 @@
 """Report of a firmware fault as plain data: cause, place, thread, call stack and last branches.
 
->>> import emu
->>> machine = emu.load("firmware.elf")
->>> machine.pc = machine.program_address("broken")
->>> report = machine.run().fault                # a FaultReport
->>> report.facts()["cause"]
-'address error trap: reading 2 bytes at 0x0801, an odd address, no handler'
->>> report.frames[0].function, report.thread    # frames are of type StackEntry
-('broken', None)
->>> report.branches                             # of type TakenBranch
-()
+    >>> import emu
+    >>> machine = emu.load("firmware.elf")
+    >>> machine.pc = machine.program_address("broken")
+    >>> report = machine.run().fault                # a FaultReport
+    >>> report.facts()["cause"]
+    'address error trap: reading 2 bytes at 0x0801, an odd address, no handler'
+    >>> report.frames[0].function, report.thread    # frames are of type StackEntry
+    ('broken', None)
+    >>> report.branches                             # of type TakenBranch
+    ()
+
+`FaultReport.report` returns all of it as text.
 """
 
 from __future__ import annotations

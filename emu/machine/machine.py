@@ -51,19 +51,19 @@ class _WRegisters(Protocol):
 class Machine(StateAccess):
     """A chip with a program. `docs/reference/engines.md` describes the engines.
 
-    >>> import emu
-    >>> machine = emu.load("firmware.elf")
-    >>> machine.run(cycles=1000).reason, machine.cycle >= 1000
-    ('limit', True)
-    >>> state = machine.snapshot()
-    >>> machine.run(until="twice").reason
-    'until'
-    >>> machine.poke("count", 7)
-    >>> machine.peek("count"), machine.w[0] == machine.peek("W0")
-    (7, True)
-    >>> machine.restore(state)
-    >>> machine.peek("count") == 7
-    False
+        >>> import emu
+        >>> machine = emu.load("firmware.elf")
+        >>> machine.run(cycles=1000).reason, machine.cycle >= 1000
+        ('limit', True)
+        >>> state = machine.snapshot()
+        >>> machine.run(until="twice").reason
+        'until'
+        >>> machine.poke("count", 7)
+        >>> machine.peek("count"), machine.w[0] == machine.peek("W0")
+        (7, True)
+        >>> machine.restore(state)
+        >>> machine.peek("count") == 7
+        False
 
     `ipl_slip` = 1 accepts an interrupt right after a write that raises IPL or clears IEC (isa.md §14.3).
     `board` is called with the peripherals and returns the board around the chip (`emu.boards`).

@@ -143,18 +143,18 @@ class Robot:
     It has every attribute of `emu.Machine` by the same name, with the same units: `call`, `hook_pc`, `set_var`,
     `snapshot`, `restore`, `threads`, ... `run`, `step` and `uart[n].expect` raise FirmwareFault.
 
-    >>> from pathlib import Path
-    >>> from openswarm.testing.robot import Robot
-    >>> robot = Robot(Path("firmware.elf"), selector=3)
-    >>> robot.uart.expect("ready", within=50)[0]       # ms; `robot.uart` are UartLines, `robot.uart[1]` a UartLine
-    b'ready'
-    >>> robot.call("twice", 21), robot.var("speed.right")
-    (42, -100)
-    >>> with robot.measured() as measured:             # a Measured
-    ...     stop = robot.run(ms=1)
-    >>> cycles = measured.cycles("twice")              # Cycles
-    >>> cycles.calls > 100, cycles.least <= cycles.most
-    (True, True)
+        >>> from pathlib import Path
+        >>> from openswarm.testing.robot import Robot
+        >>> robot = Robot(Path("firmware.elf"), selector=3)
+        >>> robot.uart.expect("ready", within=50)[0]       # ms; `robot.uart` are UartLines, `robot.uart[1]` a UartLine
+        b'ready'
+        >>> robot.call("twice", 21), robot.var("speed.right")
+        (42, -100)
+        >>> with robot.measured() as measured:             # a Measured
+        ...     stop = robot.run(ms=1)
+        >>> cycles = measured.cycles("twice")              # Cycles
+        >>> cycles.calls > 100, cycles.least <= cycles.most
+        (True, True)
     """
 
     def __init__(self, image: Path, **around: Any) -> None:

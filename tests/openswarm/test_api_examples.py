@@ -56,8 +56,10 @@ def test_every_public_class_has_an_example(name: str) -> None:
     if name != "arena.scene.schema":
         words = set(re.findall(r"\w+", examples))
         assert [one.__name__ for one in classes if one.__name__ not in words and ">>>" not in (one.__doc__ or "")] == []
-    for one in classes:
-        assert inspect.getdoc(one)
+    for one in (module, *classes):
+        text = inspect.getdoc(one)
+        assert text
+        assert not re.search("^>>>", text, re.MULTILINE), "indent the example: it is a block of code on the site"
 
 
 def _examples(module: ModuleType) -> str:

@@ -14,14 +14,16 @@ if TYPE_CHECKING:  # numpy is imported on the first use of the arrays
 
 
 class Epuck(EpuckHardware):
-    """An e-puck of hardware version 1.1 or 1.2; see `EpuckHardware` for the parameters.
+    """An e-puck of hardware version 1.1 or 1.2.
 
-    >>> from functools import partial
-    >>> import emu
-    >>> from emu.boards.epuck.board import Epuck
-    >>> machine = emu.load("firmware.elf", board=partial(Epuck, selector=3))
-    >>> machine.board.selector.position
-    3
+        >>> from functools import partial
+        >>> import emu
+        >>> from emu.boards.epuck.board import Epuck
+        >>> machine = emu.load("firmware.elf", board=partial(Epuck, selector=3))
+        >>> machine.board.selector.position
+        3
+
+    `EpuckHardware` describes the parameters.
     """
 
     def __init__(self, chip: Peripherals, *, camera: str | None = "PO6030K", selector: int = 0, seed: int = 0) -> None:

@@ -25,15 +25,17 @@ LEFT, RIGHT = 0, 1
 
 
 class Outputs:
-    """The robot's outputs as arrays, which `update` fills in place.
+    """The robot's outputs as arrays.
 
-    >>> import emu
-    >>> machine = emu.load("firmware.elf")
-    >>> machine.run(seconds=0.001).reason
-    'limit'
-    >>> machine.board.outputs.update()
-    >>> machine.board.outputs.steps.tolist(), bool(machine.board.outputs.leds.any())
-    ([0, 0], False)
+        >>> import emu
+        >>> machine = emu.load("firmware.elf")
+        >>> machine.run(seconds=0.001).reason
+        'limit'
+        >>> machine.board.outputs.update()
+        >>> machine.board.outputs.steps.tolist(), bool(machine.board.outputs.leds.any())
+        ([0, 0], False)
+
+    `update` fills the arrays in place.
     """
 
     def __init__(self, board: EpuckHardware) -> None:
@@ -77,13 +79,15 @@ class Outputs:
 
 
 class Inputs:
-    """The robot's inputs. Write the arrays and attributes, then call `apply`.
+    """The robot's inputs.
 
-    >>> import emu
-    >>> inputs = emu.load("firmware.elf").board.inputs
-    >>> inputs.distance[0] = 20.0      # mm
-    >>> inputs.battery = 3.5           # V
-    >>> inputs.apply()
+        >>> import emu
+        >>> inputs = emu.load("firmware.elf").board.inputs
+        >>> inputs.distance[0] = 20.0      # mm
+        >>> inputs.battery = 3.5           # V
+        >>> inputs.apply()
+
+    Write the arrays and attributes, then call `apply`.
     """
 
     def __init__(self, board: EpuckHardware) -> None:
