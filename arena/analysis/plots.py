@@ -14,7 +14,8 @@ import numpy as np
 from cycler import cycler
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.patches import Circle, Polygon, Rectangle
+from matplotlib.lines import Line2D
+from matplotlib.patches import Circle, Patch, Polygon, Rectangle
 
 from arena.analysis.comparison import series_by_seed
 from arena.analysis.statistics import bootstrap_band
@@ -26,6 +27,8 @@ from arena.trial.record import Trial
 
 Runs = Mapping[str, list[Trial]]
 SNAPSHOTS_S: Final = (0.0, 600.0)
+_KINDS: Final = "0.4"
+"""Grey of the legend's entries that belong to every run."""
 NAMES: Final = ("snapshots", "curves", "trajectories", "cpu-load")
 
 
@@ -124,8 +127,19 @@ def curves(runs: Runs) -> Figure:
         top = None if curve.best is None else 1.05 * curve.scale * curve.best
         axis.set_ylim(min(axis.get_ylim()[0], 0), top)
         if not number:
-            axis.legend(fontsize=8)
+            axis.legend(handles=_legend(axis), fontsize=8)
     return figure
+
+
+def _legend(axis: Axes) -> list[Line2D | Patch]:
+    """Return the entries of a figure of curves: the runs, then what line, band and dashes mean where a run has them."""
+    runs = [line for line in axis.get_lines() if not str(line.get_label()).startswith("_")]
+    if not axis.collections:
+        return [*runs]
+    mean = Line2D([], [], color=_KINDS, label="mean")
+    band = Patch(color=_KINDS, alpha=0.3, linewidth=0, label="95 % band of the mean")
+    deviation = Line2D([], [], color=_KINDS, linestyle="--", linewidth=1, label="mean ± sd")
+    return [*runs, mean, band, deviation]
 
 
 def _band(axis: Axes, name: str, times: Any, values: Any, curve: Curve) -> None:
