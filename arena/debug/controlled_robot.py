@@ -21,6 +21,7 @@ from greenlet import getcurrent, greenlet
 from arena.debug.input_log import InputLog
 from arena.robots.controller import Controller
 from arena.robots.firmware_controller import FirmwareController
+from arena.scene.robot_kind import EPUCK
 from arena.trial.snapshot import state_view
 from arena.world.physics import World
 from emu.debug.history import History, position
@@ -114,7 +115,9 @@ class ControlledRobot:
         """Take control of the robot in a new or repeated trial. Raises ValueError if the robot has no firmware."""
         controller = controllers[self._robot]
         if not isinstance(controller, FirmwareController):
-            raise ValueError(f"--robot {self._robot}: it runs no firmware of an e-puck but {controller.place()}")
+            kind = world.scene.robot_kind(self._robot)
+            why = "its brain is scripted" if kind is EPUCK else f"it is a {kind.name}"
+            raise ValueError(f"--robot {self._robot}: it has no firmware of an e-puck: {why}")
         self._world, self._controllers, self._controller = world, controllers, controller
         self._set_native(False)
         self.machine = controller.machine
