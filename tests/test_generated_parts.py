@@ -10,7 +10,7 @@ import unverified
 from generated_part import GeneratedPart
 
 
-@pytest.mark.parametrize("script", [avr_table, json_outputs, port_files, unverified], ids=lambda script: script.__name__)
+@pytest.mark.parametrize("script", [avr_table, json_outputs, port_files, unverified], ids=lambda one: one.__name__)
 def test_the_page_is_what_the_script_makes(script) -> None:
     """Each page has the part that its script makes from the tree."""
     assert script.PART.is_current(), f"run: python docs/tools/{script.__name__}.py --write"
