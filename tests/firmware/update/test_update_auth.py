@@ -16,12 +16,15 @@ from openswarm.flashing.authentication import KEY_SLOT, authenticated, key_row, 
 from openswarm.flashing.loaders import ROW_BYTES
 from openswarm.flashing.program import ROWS, Program
 from tests.firmware.update.host_programs import OPENSWARM, on_host, run_on_host
+from tests.firmware.update.test_update import ACTIVATE, CONFIRM, RECEIVE, TARGET_APPS, Robot, rows_of
 
 AUTH = OPENSWARM / "io" / "update_auth"
 ASCON = (f"-I{AUTH}", AUTH / "ascon.c")
 OPTION = ("-DSYS_UPDATE_AUTH", *ASCON, AUTH / "update_auth.c")
 ATTACKED = ("-Wno-unused-function", *OPTION)
 VECTORS = Path(__file__).parents[2] / "vectors" / "ascon_aead128.csv"
+KEPT = 0x7FFFF8
+"""Program address of the first word of the data EEPROM that update_auth uses."""
 LONGEST = 3056
 """Bytes of the longest program without its tag."""
 
@@ -96,6 +99,52 @@ def test_power_may_fail_at_every_operation(tmp_path):
 
 def test_neighbours_may_say_anything(tmp_path):
     assert int(re.search(r"(\d+) messages", on_host("hostile", tmp_path, OPTION))[1]) > 100_000
+
+
+class RobotWithKey(Robot):
+    """A robot that authenticates the programs that it receives through its RAM."""
+
+    def provision(self, key: bytes) -> None:
+        self.key = key
+        for at in range(0, len(key), 2):
+            self.machine.program.put(KEY_SLOT + at, int.from_bytes(key[at : at + 2], "little"))
+
+    def tell(self, command: int, version: int) -> None:
+        program = authenticated(Program(version, (rows_of(version),), 16), self.key)
+        facts = version.to_bytes(2, "little") + bytes([1, 0]) + program.crc.to_bytes(4, "little")
+        for name, data in (("facts", facts), ("bytes", program.rows[0]), ("command", bytes([command, 0]))):
+            at = self.machine.address_of(name)
+            self.machine.record.bytes[at : at + len(data)] = data
+        while self.run():
+            pass
+
+    def kept(self) -> list[int]:
+        """Return the words of the data EEPROM with the kept version."""
+        return [self.machine.program.word(KEPT + 2 * cell) for cell in range(4)]
+
+
+@pytest.mark.slow
+def test_a_robot_keeps_the_highest_version_in_its_eeprom(image):
+    """The emulated chip runs programs with tags, keeps the version before each in turn, and refuses a replay."""
+    sources = ("io/update/update", "board/epuck/update/update_cells", "io/update_auth/ascon",
+               "io/update_auth/update_auth", "board/epuck/update_auth/key_cells")  # fmt: skip
+    bare = " ".join(f"openswarm/{name}.c" for name in sources) + " openswarm/board/epuck/update_auth/key_slot.S"
+    robot = RobotWithKey(emu.load(image("updates", TARGET_APPS, "DEFINES=-DSYS_UPDATE_AUTH", f"BARE={bare}")))
+    robot.provision(bytes(range(1, 17)))
+    assert robot.boot("POR") == 0
+    seen = []
+    for version in (1, 2, 3):
+        robot.tell(RECEIVE, version)
+        robot.tell(ACTIVATE, version)
+        assert robot.boot("POR") == version
+        robot.tell(CONFIRM, version)
+        assert robot.machine.peek("refused") == 0
+        seen.append(robot.kept())
+    assert seen == [[0xFFFF] * 4, [1, 0xFFFE, 0xFFFF, 0xFFFF], [1, 0xFFFE, 2, 0xFFFD]]
+    robot.tell(RECEIVE, 2)
+    assert robot.machine.peek("refused") == 3  # begin, row and end
+    robot.provision(bytes(range(2, 18)))
+    assert robot.boot("POR") == 0  # another key: no program of the old one
 
 
 @pytest.mark.parametrize(("unused", "rows"), [(0, 3), (15, 3), (16, 2), (90, 2)])
