@@ -267,6 +267,8 @@ def _code_generation(options: CcOptions, word: str) -> bool:
             options.clang.append("-ffast-math")
     elif word in ("-g0", "-g", "-g1", "-g2", "-g3", "-ggdb") or word.startswith("-gdwarf"):
         options.debug = word != "-g0"
+    elif word.startswith("-g"):
+        raise ToolError(f"unknown debug level '{word}' (expected -g, -g0 to -g3, -ggdb or -gdwarf)")
     elif word.startswith(("-flto", "-fno-lto")):
         options.lto = word.startswith("-flto")
     elif word in ("-fcache-ir", "-fno-cache-ir"):

@@ -163,6 +163,7 @@ def test_formats_of_run_time_strings(tmp_path: Path) -> None:
     ("words", "message"),
     [
         (["-fnonsense"], "unknown option '-fnonsense'"),
+        (["-g--DX=1"], "unknown debug level '-g--DX=1'"),
         (["-O7"], "unknown level '-O7'"),
         (["-Wa,--nonsense"], "unknown option '--nonsense' of the assembler"),
         (["-ffixed-w8"], "save the register around your assembly"),
