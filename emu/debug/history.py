@@ -179,8 +179,11 @@ class History:
         return stop
 
     def _recorded_stop(self, stop: Stop | None) -> Stop | None:
-        """Return a stop of the replay as the original run reported it: replayed faults are not diagnosed."""
-        return stop if stop is None else self._fault_stops.get(self.machine.cycle, stop)
+        """Return a stop of the replay as the original run reported it: replayed faults are not diagnosed.
+
+        A loop of resets ends the recording, but no replay.
+        """
+        return None if stop is None and self.is_past else self._fault_stops.get(self.machine.cycle, stop)
 
     def _next_input(self) -> int:
         """Return the next recorded cycle at which the machine received input; NEVER if there is none."""

@@ -490,7 +490,7 @@ class Machine(StateAccess):
             self.state.cycle += 1
         self.reset(reset.cause)
         self._last_reset = last = next_reset(self._last_reset, reset.cause, origin, self.cycle)
-        loop = not last.repeats
+        loop = not last.repeats and not self.events.quiet  # the count belongs to the present, not to a replay
         if not self.stop_on_fault or not (reset.fault or loop):
             return None
         detail = reset.detail if reset.fault else f"reset loop: {reset.detail}, {RESET_LOOP} times in a row"

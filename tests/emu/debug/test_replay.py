@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+from emu.debug.history import History
 from emu.debug.replay import retrace
 from emu.machine.machine import Machine
 
@@ -21,3 +22,28 @@ def test_the_first_instruction_of_a_replay_may_be_the_faulty_one(word: int, is_w
     found = retrace(machine, machine.save_state(), 20, lambda: bool(machine.state.intcon1 & 8))
     assert found is not None
     assert (found.last, found.bad_access) == (START, (0x1001, 2, is_write))
+
+
+def test_replayed_resets_are_no_loop_of_resets() -> None:
+    """Without this, a replay of some resets would end the run, because they were counted once already."""
+
+    def machine() -> Machine:
+        made = Machine(engine="plain")
+        made.program.put(0, 0x040000 | START)  # GOTO, then 40 NOPs, then RESET
+        for address in [2, *range(START, START + 80, 2)]:
+            made.program.put(address, 0)
+        made.program.put(START + 80, 0xFE0000)
+        made.reset("POR")
+        return made
+
+    expected = machine().run(cycles=10_000)
+    assert "reset loop" in expected.detail
+    history = History(machine())
+    middle = expected.cycle - 60
+    assert history.advance(middle) is None
+    history.seek(1)
+    assert history.advance(middle) is None
+    assert history.machine.cycle == middle
+    stop = history.advance(10_000)
+    assert stop is not None
+    assert (stop.reason, stop.cycle, stop.detail) == (expected.reason, expected.cycle, expected.detail)
