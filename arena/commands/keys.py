@@ -9,7 +9,8 @@ from collections.abc import Iterator
 from dataclasses import fields
 from typing import Any, Final, NamedTuple
 
-from arena.scene.schema import LIMITS, LISTS, TABLES
+from arena.scene.limits import LIMITS
+from arena.scene.schema import LISTS, TABLES
 from arena.trial.strict_json import json_text
 from emu.host.errors import CommandParser
 

@@ -7,8 +7,9 @@ from collections.abc import Callable, Mapping
 from typing import Any, Final
 
 from arena.scene import geometry
+from arena.scene.limits import LIMITS
 from arena.scene.robot_kind import KINDS
-from arena.scene.schema import INHERIT, LIMITS, NAMED, PLACES, ObjectKind, Points, RobotGroup
+from arena.scene.schema import INHERIT, NAMED, PLACES, ObjectKind, Points, RobotGroup
 from emu.boards.epuck.remote import KEYS
 from emu.boards.kilobot.messages import TYPES
 
@@ -91,7 +92,7 @@ def check_off(errors: TableErrors, off: Points, robots: int) -> None:
 
 
 def check_limits(errors: TableErrors, name: str, table: Any, number: int | None = None) -> None:
-    """Check the numbers of a table against `schema.LIMITS`. Raises SceneError."""
+    """Check the numbers of a table against `limits.LIMITS`. Raises SceneError."""
     for key, (low, high) in LIMITS[type(table)].items():
         value = getattr(table, key)
         if not low <= value <= high:
