@@ -131,8 +131,7 @@ def header(chip: Chip) -> str:
         " * Written by `python -m toolchain.device_header` from the chip's register table; do not edit. */",
         f"#ifndef {chip.name.upper()}_H",
         f"#define {chip.name.upper()}_H",
-        f"#ifndef __{chip.name}__",
-        f"#error \"this header is for the {chip.name}: compile with -mcpu={chip.name.removeprefix('dsPIC')}\"",
+        *_requirement(chip.name),
         "#endif",
         "",
         "#include \"dspic_compiler.h\"",
@@ -148,6 +147,27 @@ def header(chip: Chip) -> str:
     lines += ["", "/* Bits whose name is unique on this chip. */", *bit_macros(chip), ""]
     lines += ["#ifdef __cplusplus", "}", "#endif", "#endif", "", "#endif", ""]
     return "\n".join(lines)
+
+
+def microchip_header(chip_name: str) -> str:
+    """Text of the header of a chip with Microchip's name, such as p30F6014A.h."""
+    stem = chip_name.lower()
+    lines = [
+        "/* SPDX-License-Identifier: MIT */",
+        "/* Microchip's name of the device header. */",
+        *_requirement(chip_name),
+        "#else",
+        f'#include "{stem}.h"',
+        f'#include "{stem}_fields.h"',
+        "#endif",
+    ]
+    return "\n".join([*lines, ""])
+
+
+def _requirement(chip_name: str) -> list[str]:
+    """Return the lines that begin a condition and refuse another chip than this one."""
+    device = chip_name.removeprefix("dsPIC")
+    return [f"#ifndef __{chip_name}__", f'#error "this header is for the {chip_name}: compile with -mcpu={device}"']
 
 
 @cache
@@ -186,15 +206,13 @@ def _write_all(target: Path, chip: Chip) -> None:
 
     XC16 finds its headers in any case: programs use `p30F4011.h`, `p30f4011.h` and `p30f6014A.h`.
     """
-    device = chip.name.removeprefix("dsPIC")
     for name, text in peripheral_library.headers(chip).items():
         _write(target.with_suffix("") / name, text)
-    fields = target.with_name(f"{target.stem}_fields.h")
-    _write(fields, field_header(chip))
-    for name in sorted({f"p{device}", f"p{device.lower()}", f"p{device.replace('F', 'f')}"}):
-        comments = "/* SPDX-License-Identifier: MIT */\n/* Microchip's name of the device header. */\n"
-        names = f'#include "{target.name}"\n#include "{fields.name}"\n'
-        _write(target.with_name(f"{name}.h"), comments + names)
+    _write(target.with_name(f"{target.stem}_fields.h"), field_header(chip))
+    for name in NAMES:  # the headers of other chips explain which -mcpu they need
+        device = name.removeprefix("dsPIC")
+        for spelling in sorted({f"p{device}", f"p{device.lower()}", f"p{device.replace('F', 'f')}"}):
+            _write(target.with_name(f"{spelling}.h"), microchip_header(name))
     _write(target, header(chip))
 
 
