@@ -44,6 +44,9 @@ class Stepwise:
     def take_led_changes(self) -> list[LedChange]:
         return self._controller.take_led_changes()
 
+    def take_messages(self) -> list[SerialLine]:
+        return self._controller.take_messages()
+
     def feed_uart(self, data: bytes) -> None:
         self._controller.feed_uart(data)
 

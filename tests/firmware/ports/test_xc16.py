@@ -152,6 +152,8 @@ def check_gnu99(source: Path, *folders: Path) -> None:
     # Addresses have 16 bits: pointers do not fit into integers on a host.
     layout = ["-DSYS_DEFAULT_STACK=256", "-include", "stddef.h", "-Wno-type-limits", "-Wno-attributes"]
     layout += ["-D__dsPIC30F6014A__"]  # as -mcpu defines it
+    if source.parent.name == "update_auth":
+        layout += ["-DSYS_UPDATE_AUTH"]  # as its device.mk defines it
     layout += [f"-D__builtin_{one}" for one in BUILTINS]
     command = ["gcc", *flags, *layout, *includes, str(source)]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
