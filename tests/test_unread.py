@@ -12,6 +12,7 @@ from typing import Any
 import pytest
 
 from tests.cases import check_all
+from tests.full_device import needs_full_device
 from tests.watchdog import HANG
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -45,7 +46,7 @@ def test_a_reader_that_has_gone_is_no_failure() -> None:
     check_all(check, WORDS)
 
 
-@pytest.mark.skipif(not Path("/dev/full").exists(), reason="only Linux has /dev/full")
+@needs_full_device
 def test_a_full_disk_under_the_output_is_one_line() -> None:
     """If standard output is on a full disk, a command ends with status 2 and one line."""
 

@@ -16,10 +16,8 @@ from openswarm.flashing.loaders import ROW_BYTES, ROW_WORDS
 from openswarm.flashing.program import ROWS, Program
 from openswarm.flashing.rows import Row
 
-KEY_SLOT: Final = 0x0167C0
-"""Program address of the row with the key (board/epuck/update_auth/key_slot.h): eight words with two bytes each."""
 KEY_SYMBOL: Final = "__update_key"
-"""Symbol of firmware that authenticates programs."""
+"""Symbol, in firmware that authenticates programs, of the row with the key: eight words with two bytes each."""
 _LONGEST: Final = 64
 """Maximum number of bytes of a key file: the digits, space and an end of line."""
 _ADVICE: Final = f"`openssl rand -hex {BYTES}` makes one"
@@ -70,9 +68,10 @@ def authenticated(program: Program, key: bytes) -> Program:
 
 def key_row(image: Image, key: bytes) -> Row:
     """Return the row of flash with the key. Raises ValueError for firmware that has no place for it."""
-    if image.symbols.find(KEY_SYMBOL) is None:
+    slot = image.symbols.find(KEY_SYMBOL)
+    if slot is None:
         raise ValueError(
             f"{image.path}: keeps no key: expected the ELF file of firmware with DEVICES := update update_auth"
         )
     words = [int.from_bytes(key[at : at + 2], "little") for at in range(0, BYTES, 2)]
-    return KEY_SLOT, words + [ERASED] * (ROW_WORDS - len(words))
+    return slot.address, words + [ERASED] * (ROW_WORDS - len(words))

@@ -9,9 +9,15 @@ from pathlib import Path
 
 import pytest
 
+from arena.trial import checkpoints
 from tests.arena.images import BEGIN
 from tests.firmware.conftest import built_once
+from tests.full_device import FULL_DEVICE, NO_FULL_DEVICE
 from toolchain.driver import driver
+
+needs_fork = pytest.mark.skipif(
+    not checkpoints.CAN_FORK, reason="checkpoints are forked processes, which only Linux makes safely"
+)
 
 
 @pytest.fixture(scope="session")
@@ -61,11 +67,10 @@ TALKING = f"""{BEGIN}
 
 @pytest.fixture
 def full_disk() -> Path:
-    """Return a file whose writes fail with ENOSPC. Only Linux has such a file without a mount, which needs root."""
-    device = Path("/dev/full")
-    if not device.exists():
-        pytest.skip("only Linux has /dev/full, a device that is always full")
-    return device
+    """Return a file whose writes fail with ENOSPC. See `FULL_DEVICE`."""
+    if not FULL_DEVICE.exists():
+        pytest.skip(NO_FULL_DEVICE)
+    return FULL_DEVICE
 
 
 @pytest.fixture

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.full_device import FULL_DEVICE, NO_FULL_DEVICE
 from toolchain.cli import main as toolchain
 
 resource = pytest.importorskip("resource")
@@ -37,8 +38,8 @@ def test_a_full_disk_under_a_waveform_is_one_line(option: str, target: str, imag
     used afterwards."""
     if not Path(target).is_absolute():
         target = str(tmp_path / target)
-    elif not Path(target).exists():
-        pytest.skip("only Linux has /dev/full")
+    elif not FULL_DEVICE.exists():
+        pytest.skip(NO_FULL_DEVICE)
     words = ["run", str(image), "--cycles", "60000", "--engine", "plain", option, target]
     done = subprocess.run([sys.executable, "-B", "-m", "emu", *words], capture_output=True, text=True, check=False,
                           cwd=Path(__file__).parents[2], preexec_fn=limit_files)  # fmt: skip

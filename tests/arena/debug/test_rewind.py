@@ -25,15 +25,13 @@ from arena.replay.live_feed import live_path
 from arena.trial import checkpoints
 from emu.dap.wire import Message
 from emu.prompt.client import Client
+from tests.arena.conftest import needs_fork
 from tests.emu.dap.node import mocha, node_modules
 from tests.firmware.conftest import built_once
 from tests.fuzz.seeds import base_seed
 from tests.fuzz.swarm.fuzz_rewind import SWARMS, Swarm, plan_of, walk
 
 FEW = Swarm("clustering", 1.0, (), (), {"robots__count": 2, "objects__count": 2, "start__selector": 8})
-needs_fork = pytest.mark.skipif(
-    not checkpoints.CAN_FORK, reason="checkpoints are forked processes, which only Linux makes safely"
-)
 
 
 @pytest.fixture

@@ -30,6 +30,7 @@ from arena.studio.session import CommandRefusedError
 from arena.trial import checkpoints
 from arena.trial.trial import run_trial
 from tests.arena.browser import BROWSER, needs_browser, probed
+from tests.arena.conftest import needs_fork
 from tests.arena.images import ECHO
 from tests.watchdog import HANG
 
@@ -146,7 +147,7 @@ def test_commands_during_a_rewind_discard_later_actions() -> None:
         assert studio.ask("digest") == last, "later actions are discarded"
 
 
-@pytest.mark.skipif(not checkpoints.CAN_FORK, reason="checkpoints are forked processes, which only Linux makes safely")
+@needs_fork
 def test_a_checkpoint_restores_the_state_to_the_byte(clustering_image: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """After a checkpoint is restored, the trial continues as in the first pass, with an object moved after each
     checkpoint.

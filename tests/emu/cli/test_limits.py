@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from emu.host.exit_status import BAD_INPUT
+from tests.full_device import needs_full_device
 from tests.watchdog import HANG
 from toolchain.driver import driver
 
@@ -28,7 +29,7 @@ def endless(tmp_path_factory):
     return folder / "main.elf"
 
 
-@pytest.mark.skipif(not Path("/dev/full").exists(), reason="only Linux has /dev/full, a device that is always full")
+@needs_full_device
 @pytest.mark.parametrize("words", [(), ("--uart1", "/dev/full")])
 def test_output_without_room_is_an_error(words):
     with open("/dev/full", "w") as full:

@@ -15,7 +15,7 @@ import emu
 from emu.image.loader import load_image
 from emu.machine.machine import Machine
 from openswarm.cli import main
-from openswarm.flashing.authentication import KEY_SLOT, authenticated, key_row
+from openswarm.flashing.authentication import authenticated, key_row
 from openswarm.flashing.boot_session import RobotError
 from openswarm.flashing.loaders import LOADERS
 from openswarm.flashing.messages import Advertisement, framed, unframed
@@ -153,9 +153,9 @@ def test_a_robot_with_a_key_takes_only_programs_of_its_key(image, programs):
     row = key_row(firmware, key)
     written = rows(firmware, LOADERS[0x91], [row])
     assert row == written[-2]
-    assert [address for address, _ in written].count(KEY_SLOT) == 1
+    assert [address for address, _ in written].count(row[0]) == 1
     for at, word in enumerate(row[1]):
-        robot.program.put(KEY_SLOT + 2 * at, word)
+        robot.program.put(row[0] + 2 * at, word)
     line, true = Line(robot), authenticated(of(programs[4]), key)
     cut = Program(5, true.rows[-1:])
     for forged in (of(programs[5]), cut):

@@ -12,7 +12,7 @@ import emu
 from emu.image.loader import load_image
 from openswarm.cli import main
 from openswarm.flashing.ascon import tag
-from openswarm.flashing.authentication import KEY_SLOT, authenticated, key_row, read_key
+from openswarm.flashing.authentication import authenticated, key_row, read_key
 from openswarm.flashing.loaders import ROW_BYTES
 from openswarm.flashing.program import ROWS, Program
 from tests.firmware.update.host_programs import OPENSWARM, on_host, run_on_host
@@ -106,8 +106,9 @@ class RobotWithKey(Robot):
 
     def provision(self, key: bytes) -> None:
         self.key = key
-        for at in range(0, len(key), 2):
-            self.machine.program.put(KEY_SLOT + at, int.from_bytes(key[at : at + 2], "little"))
+        slot, words = key_row(self.machine.image, key)
+        for at, word in enumerate(words):
+            self.machine.program.put(slot + 2 * at, word)
 
     def tell(self, command: int, version: int) -> None:
         program = authenticated(Program(version, (rows_of(version),), 16), self.key)
@@ -206,8 +207,3 @@ def test_firmware_without_the_option_takes_no_key(tmp_path):
     image = load_image(emu.build(tmp_path / "lamp.c", output=tmp_path / "lamp.elf"))
     with pytest.raises(ValueError, match="keeps no key: expected the ELF file of firmware with DEVICES := update"):
         key_row(image, bytes(16))
-
-
-def test_host_and_firmware_know_one_key_slot():
-    text = (OPENSWARM / "board" / "epuck" / "update_auth" / "key_slot.h").read_text()
-    assert int(re.search(r"#define UPDATE_KEY (0x\w+)", text)[1], 0) == KEY_SLOT

@@ -32,7 +32,8 @@ void machine_record(const record *r)
     }
 }
 
-/* The clock stands still: a tick that came before the CPU sleeps, and gives the kernel no work, would be its last. */
+/* Only machine_tick() advances the clock. If the CPU took that tick before it sleeps, and the kernel had no work then, no
+ * other interrupt would end the sleep. */
 void __wrap_hal_idle(const volatile uint16_t *pending)
 {
     if (++idles == MOST_IDLES) {
@@ -43,6 +44,16 @@ void __wrap_hal_idle(const volatile uint16_t *pending)
         machine_tick();
     }
     __real_hal_idle(pending);
+}
+
+void boundaries_isr(void)
+{
+    isr();
+}
+
+void machine_init(void)
+{
+    inject_init();
 }
 
 /* A tick counts 1 ms of the slice, which shall not end before machine_slice(). */

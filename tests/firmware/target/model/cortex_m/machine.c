@@ -15,16 +15,6 @@ static void mask_interrupts(void)
     __asm__ volatile("cpsid i" ::: "memory");
 }
 
-void boundaries_isr(void)
-{
-    isr();
-}
-
-void machine_init(void)
-{
-    inject_init();
-}
-
 void machine_start(void)
 {
     board_start();

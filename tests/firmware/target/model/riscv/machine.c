@@ -9,16 +9,6 @@ static void mask_interrupts(void)
     (void)CSR_CLEAR(mstatus, MSTATUS_MIE);
 }
 
-void boundaries_isr(void)
-{
-    isr();
-}
-
-void machine_init(void)
-{
-    inject_init();
-}
-
 /* The port computes the first tick from a time far in the future: only machine_tick() makes one due. */
 void machine_start(void)
 {
