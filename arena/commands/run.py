@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from arena.campaign.campaign import FinishedTrial, Plan, locked_folder, open_folder, run_all
+from arena.campaign.interrupt import kept_interrupts
 from arena.commands.arguments import count, count_or_none, duration, removed_processes
 from arena.commands.progress import ProgressDisplay
 from arena.experiments import experiment_file
@@ -279,7 +280,11 @@ def result_line(trial: Trial) -> str:
 def run_with_progress(plan: Plan, folder: Path, missing: list[int], jobs: int, scheduler: str | None = None) -> bool:
     """Run trials on local workers or on a Dask cluster; return whether a robot had a fault."""
     has_fault = False
-    with ProgressDisplay(len(missing), plan.seconds) as display:
+    with kept_interrupts() as check_interrupt, ProgressDisplay(len(missing), plan.seconds) as display:
+
+        def report(trial: int, seconds: float) -> None:
+            check_interrupt()
+            display.update(trial, seconds)
 
         def on_finished(one: FinishedTrial) -> None:
             nonlocal has_fault
@@ -288,11 +293,12 @@ def run_with_progress(plan: Plan, folder: Path, missing: list[int], jobs: int, s
             for robot, seconds, why in one.faults:
                 has_fault = True
                 display.print(f"trial {one.trial}, {seconds:.1f} s: robot {robot} {why}")
+            check_interrupt()
 
         if scheduler is not None and missing:
             from arena.campaign.cluster import run_on
 
-            run_on(scheduler, plan, folder, missing, display.update, on_finished)
+            run_on(scheduler, plan, folder, missing, report, on_finished)
         else:
-            run_all(plan, folder, missing, jobs, display.update, on_finished)
+            run_all(plan, folder, missing, jobs, report, on_finished)
     return has_fault

@@ -6,7 +6,9 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -291,27 +293,35 @@ def test_a_disk_that_fills_up_during_a_run_ends_it_and_keeps_what_is_finished(
     assert len(contents(tmp_path)) == 3
 
 
-@pytest.mark.slow
-def test_an_interrupted_run_keeps_finished_trials_and_leaves_no_half_ones(tmp_path: Path) -> None:
-    """After SIGINT the same command continues the run, and its files equal those of an uninterrupted run."""
-    command = ["run", "clustering", "--brain", "scripted", "--trials", "4", "--minutes", "1"]
-    arguments = [*command, "--jobs", "1", "--out", str(tmp_path / "a")]
-    code = f"import sys; from arena.cli import main; sys.exit(main({arguments!r}))"
-    root = Path(__file__).resolve().parents[3]
-    with subprocess.Popen([sys.executable, "-c", code], stderr=subprocess.PIPE, cwd=root) as process:
-        assert process.stderr is not None
-        deadline = time.monotonic() + HANG
-        while not (tmp_path / "a" / "trial-0001.parquet").exists():
-            assert time.monotonic() < deadline
-            time.sleep(0.01)
-        process.send_signal(signal.SIGINT)
-        output = process.stderr.read().decode()
-    assert process.returncode == 130
-    assert "finished trials are kept" in output
-    assert 1 <= len(contents(tmp_path / "a")) < 4
+class SignalWhenFreed:
+    """Sends SIGINT from its destructor, as if Ctrl-C were pressed while a world is freed."""
+
+    def __del__(self) -> None:
+        signal.raise_signal(signal.SIGINT)
+
+
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
+@pytest.mark.parametrize("sender", [lambda: signal.raise_signal(signal.SIGINT), SignalWhenFreed])
+def test_an_interrupted_run_keeps_finished_trials_and_leaves_no_half_ones(
+    tmp_path: Path, sender: Callable[[], object], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """After SIGINT the same command continues the run, and its files equal those of an uninterrupted run. A SIGINT in
+    a destructor, whose exceptions Python discards, interrupts too."""
+
+    def write_and_interrupt(path: Path, *record: Any) -> None:
+        write_trial(path, *record)
+        sender()
+
+    command = ["--trials", 4, "--jobs", 1, "--out"]
+    with monkeypatch.context() as interrupted:
+        interrupted.setattr("arena.campaign.campaign.write_trial", write_and_interrupt)
+        assert run(*command, tmp_path / "a") == 130
+    assert "finished trials are kept" in capsys.readouterr().err
+    assert list(contents(tmp_path / "a")) == ["trial-0001.parquet"]
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
     stamp = (tmp_path / "a" / "trial-0001.parquet").stat().st_mtime_ns
     for name in "ab":
-        assert main([*command, "--jobs", "2", "--out", str(tmp_path / name)]) == 0
+        assert run(*command, tmp_path / name) == 0
     assert contents(tmp_path / "a") == contents(tmp_path / "b")
     assert (tmp_path / "a" / "trial-0001.parquet").stat().st_mtime_ns == stamp
 
