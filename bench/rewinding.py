@@ -23,8 +23,8 @@ ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
 from arena.campaign.campaign import Plan  # noqa: E402
-from arena.commands.run import image_for  # noqa: E402
 from arena.debug.trial_client import DebugSession, RemoteServer  # noqa: E402
+from arena.robots.images import image_for  # noqa: E402
 from arena.scene.loader import FCY, load_scene  # noqa: E402
 from emu.prompt.client import Client  # noqa: E402
 

@@ -7,8 +7,8 @@ from dataclasses import asdict
 from pathlib import Path
 
 from arena.campaign import bundle
-from arena.commands.arguments import count, removed_processes
-from arena.commands.trust_options import add_trust_options
+from arena.commands.options.arguments import count, removed_processes
+from arena.commands.options.trust import add_trust_options
 from arena.trial.strict_json import json_text
 from emu.host.errors import CommandParser
 

@@ -10,7 +10,7 @@ from typing import Any, Final
 import numpy as np
 from matplotlib.figure import Figure
 
-from arena.commands.run import with_overrides
+from arena.commands.options.plan import with_overrides
 from arena.infrared.propagation import PUBLISHED, Optics, amplitude, distance_of
 from arena.scene.loader import Scene, load_scene
 from arena.scene.palette import LINES

@@ -6,8 +6,8 @@ import argparse
 from pathlib import Path
 
 from arena.analysis.comparison import compare_runs
-from arena.commands.arguments import duration
-from arena.commands.trust_options import add_trust_options, load_trusted
+from arena.commands.options.arguments import duration
+from arena.commands.options.trust import add_trust_options, load_trusted
 from arena.trial.record import trials_in
 from arena.trial.strict_json import json_text
 from emu.host.errors import CommandParser

@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import Final
 
 from arena.campaign.campaign import Plan, locked_folder, open_folder, trial_path
-from arena.commands.arguments import count_or_none, port
-from arena.commands.run import add_plan, copy_inputs, plan_from
+from arena.commands.options.arguments import count_or_none, port
+from arena.commands.options.plan import add_plan, copy_inputs, plan_from
 from arena.debug.controlled_robot import TrialAbortedError
 from arena.debug.trial_client import DebugSession, RemoteServer
 from arena.trial.manifest import note_host_time

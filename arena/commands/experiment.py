@@ -11,8 +11,8 @@ from arena.analysis.report import with_results
 from arena.campaign.campaign import check_folder
 from arena.commands import report
 from arena.commands import run as single
-from arena.commands.arguments import count, count_or_none, duration
-from arena.commands.run import DEFAULT_CONTROLLER
+from arena.commands.options.arguments import count, count_or_none, duration
+from arena.commands.options.plan import DEFAULT_CONTROLLER, plan_from
 from arena.robots.epuck import SELECTOR
 from emu.host.errors import CommandParser
 
@@ -111,7 +111,7 @@ def _check_arms(arms: list[argparse.Namespace], at: float) -> None:
     for arm in arms:
         if 60 * arm.minutes < at - NEAR_S:
             raise ValueError(f"the trials of {arm.out} last {60 * arm.minutes:g} s, less than --at {at:g}")
-        check_folder(single.plan_from(arm, arm.trials), arm.out)
+        check_folder(plan_from(arm, arm.trials), arm.out)
 
 
 def _check_report(options: argparse.Namespace) -> None:

@@ -6,8 +6,8 @@ import argparse
 from pathlib import Path
 
 from arena.analysis import plots
-from arena.commands.arguments import count_or_none
-from arena.commands.trust_options import add_trust_options, load_trusted
+from arena.commands.options.arguments import count_or_none
+from arena.commands.options.trust import add_trust_options, load_trusted
 from arena.replay import filmstrip
 from arena.trial.record import Trial, trials_in
 from emu.host.errors import CommandParser

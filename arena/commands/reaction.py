@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 import emu
 from arena.camera.appearance import COLOURS, NOTHING, OBJECT, ROBOT
-from arena.commands.arguments import count, count_or_none
+from arena.commands.options.arguments import count, count_or_none
 from arena.robots.epuck import SELECTOR
 from arena.robots.images import image_for
 from arena.scene.loader import FCY

@@ -9,8 +9,8 @@ from http.server import ThreadingHTTPServer
 from pathlib import Path
 from urllib.parse import parse_qs, urlsplit
 
-from arena.commands.arguments import count, duration, port
-from arena.commands.trust_options import add_trust_options, load_trusted
+from arena.commands.options.arguments import count, duration, port
+from arena.commands.options.trust import add_trust_options, load_trusted
 from arena.replay.http import LOOPBACK, RequestHandler
 from arena.replay.live_feed import Follower
 from arena.replay.page import page

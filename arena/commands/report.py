@@ -10,8 +10,8 @@ import numpy as np
 
 from arena.analysis import plots
 from arena.analysis.report import by_controller, report, with_results
-from arena.commands.arguments import duration
-from arena.commands.trust_options import add_trust_options, load_trusted
+from arena.commands.options.arguments import duration
+from arena.commands.options.trust import add_trust_options, load_trusted
 from arena.trial.manifest import read_manifest
 from arena.trial.record import trials_in, write_text
 from emu.host.errors import CommandParser

@@ -13,8 +13,9 @@ import numpy as np
 
 from arena.analysis.comparison import series_by_seed
 from arena.campaign.campaign import Plan, locked_folder, open_folder
-from arena.commands.arguments import count, count_or_none, duration
-from arena.commands.run import folder_name, run_with_progress, with_overrides
+from arena.commands.options.arguments import count, count_or_none, duration
+from arena.commands.options.plan import folder_name, with_overrides
+from arena.commands.run import run_with_progress
 from arena.experiments import experiment_file, experiment_of
 from arena.robots.epuck import SELECTOR
 from arena.scene.loader import load_scene, scripted

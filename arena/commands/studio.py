@@ -17,8 +17,8 @@ from http.server import ThreadingHTTPServer
 from typing import Any, Final
 from urllib.parse import parse_qs, urlsplit
 
-from arena.commands.arguments import port
-from arena.commands.run import add_plan, plan_from
+from arena.commands.options.arguments import port
+from arena.commands.options.plan import add_plan, plan_from
 from arena.replay.http import LOOPBACK, RequestHandler
 from arena.replay.page import page
 from arena.scene.loader import FCY

@@ -11,6 +11,7 @@ import numpy as np
 
 from arena.analysis.comparison import series_by_seed
 from arena.commands import run as single
+from arena.commands.options.plan import folder_name
 from arena.trial.record import trials_in
 from arena.trial.strict_json import json_text
 
@@ -34,13 +35,13 @@ def run(options: argparse.Namespace) -> int:
         if not equals or not values:
             raise ValueError(f"--vary {axis!r}: expected SECTION.KEY=V1,V2,...")
         axes.append([f"{place}={value}" for value in values.split(",")])
-    base = options.out or Path("results") / f"sweep-{single.folder_name(Path(options.scene).stem)}"
+    base = options.out or Path("results") / f"sweep-{folder_name(Path(options.scene).stem)}"
     quiet = argparse.Namespace(**vars(options))
     status = 0
     rows: list[dict[str, Any]] = []
     for settings in itertools.product(*axes):
         quiet.set = [*options.set, *settings]
-        quiet.out = base / "-".join(map(single.folder_name, settings))
+        quiet.out = base / "-".join(map(folder_name, settings))
         result = single.run_missing_trials(quiet)
         status, trials = max(status, int(result.faults)), trials_in(quiet.out)
         if not options.json:

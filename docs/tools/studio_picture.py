@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Final
 
 from arena.commands import studio as command
-from arena.commands.run import plan_from
+from arena.commands.options.plan import plan_from
 from arena.studio.process import Studio
 
 FIGURE: Final = Path(__file__).resolve().parents[1] / "figures" / "studio.png"

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from arena.cli import main
-from arena.commands.run import with_overrides
+from arena.commands.options.plan import with_overrides
 from arena.scene.loader import Scene, SceneError, load_scene
 from arena.trial.record import read_trial
 from arena.world.physics import World

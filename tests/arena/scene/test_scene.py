@@ -15,8 +15,8 @@ from arena.camera.appearance import FLOOR, OBJECT, WALL, appearance_of, colours_
 from arena.camera.renderer import Renderer
 from arena.campaign.campaign import Plan
 from arena.cli import main
+from arena.commands.options.plan import plan_from
 from arena.commands.run import parser as run_parser
-from arena.commands.run import plan_from
 from arena.infrared.propagation import Optics
 from arena.infrared.ring import ambient
 from arena.robots.controller import ScriptedController

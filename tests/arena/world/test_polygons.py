@@ -186,7 +186,7 @@ def test_wrong_polygons_are_refused(tmp_path: Path, old: str, new: str, message:
 
 def test_a_set_polygon_replaces_that_of_the_scene(tmp_path: Path) -> None:
     """`--set objects.polygon=[[...]]` gives a box of another size; a radius has no effect and is refused."""
-    from arena.commands.run import with_overrides
+    from arena.commands.options.plan import with_overrides
 
     scene = scene_with(tmp_path)
     wide = with_overrides(scene, ["objects.polygon=[[0,0],[40,0],[40,30],[0,30]]"])
