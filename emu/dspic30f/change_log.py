@@ -2,7 +2,7 @@
 
 Input: a connected core and what to watch. Output: entries for a consumer, in order. A change is seen after the
 instruction or at the boundary that makes it. For code that the sequencer runs, this module wraps the sequencer. Native
-code appends to the same memory (jit/translate/change_counter.py). Replayed cycles and diagnosis are not logged.
+code appends to the same memory (jit/counters/change_counter.py). Replayed cycles and diagnosis are not logged.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Cycle accounting: cycles by instruction address and CPU priority, and a log of calls, interrupts and sleeps.
 
 Input: a connected core. Outputs: cells whose sum equals the cycles that passed, and log entries for a consumer.
-Native code does its own accounting (jit/translate/cycle_counters.py). For the plain engine, this module wraps the
+Native code does its own accounting (jit/counters/cycle_counters.py). For the plain engine, this module wraps the
 sequencer, which runs everything. A machine without accounting runs the unwrapped functions.
 """
 

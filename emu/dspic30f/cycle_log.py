@@ -1,4 +1,4 @@
-"""Layout of the words after the cells of cycle accounting, for its writers (cycle_accounting.py and jit/translate).
+"""Layout of the words after the cells of cycle accounting, for its writers (cycle_accounting.py and jit/counters).
 
 The module imports no package for arrays, which the translator does not need.
 """

@@ -1,7 +1,7 @@
 """Log of instructions: the state before each instruction and before each boundary.
 
 Input: a connected core. Output: entries for a consumer, in order. For what the sequencer runs, this module wraps the
-sequencer. Native code appends to the same memory (jit/translate/instruction_counter.py). Replayed cycles and diagnosis
+sequencer. Native code appends to the same memory (jit/counters/instruction_counter.py). Replayed cycles and diagnosis
 are not logged.
 """
 

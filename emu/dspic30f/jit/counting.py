@@ -15,16 +15,16 @@ from emu.dspic30f.core import Core
 from emu.dspic30f.cycle_accounting import CycleAccounting
 from emu.dspic30f.cycle_log import LONGEST_RUN
 from emu.dspic30f.instruction_log import RUN_CYCLES, InstructionLog
-from emu.dspic30f.jit.translate.change_counter import ChangeBoundaryCounter, ChangeCounter
-from emu.dspic30f.jit.translate.cycle_counters import (
+from emu.dspic30f.jit.counters.change_counter import ChangeBoundaryCounter, ChangeCounter
+from emu.dspic30f.jit.counters.cycle_counters import (
     AccountingBoundaryCounter,
     AccountingCounter,
     BoundaryCounter,
     CycleCounter,
     RowOf,
 )
-from emu.dspic30f.jit.translate.execution_counter import ExecutionCounter
-from emu.dspic30f.jit.translate.instruction_counter import InstructionBoundaryCounter, InstructionCounter
+from emu.dspic30f.jit.counters.execution_counter import ExecutionCounter
+from emu.dspic30f.jit.counters.instruction_counter import InstructionBoundaryCounter, InstructionCounter
 from emu.dspic30f.jit.translate.region import Region
 
 

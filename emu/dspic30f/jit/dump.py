@@ -12,9 +12,9 @@ from typing import Protocol
 
 from emu.dspic30f.isa.row import Insn
 from emu.dspic30f.jit.engine import BLOCK_LEVEL, CodeTable, JitEngine
+from emu.dspic30f.jit.ir.values import Number
 from emu.dspic30f.jit.translate.function import Translator
 from emu.dspic30f.jit.translate.region import Region, Step
-from emu.dspic30f.jit.translate.values import Number
 from emu.dspic30f.jit.worker import Backend
 
 

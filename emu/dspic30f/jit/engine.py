@@ -489,7 +489,7 @@ class JitEngine:
         bus = self._core.bus
         key = bus.off, frozenset(bus.watched), layout.limit_armed
         if key not in self._indirect_sfr:
-            from emu.dspic30f.jit.translate.indirect_sfr import indirect_sfr_text
+            from emu.dspic30f.jit.ir.indirect_sfr import indirect_sfr_text
 
             text = indirect_sfr_text(self._core, layout)
             self._indirect_sfr[key] = self._at_once(text, STEP_LEVEL)

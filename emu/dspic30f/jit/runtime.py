@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Final
 
 from emu.dspic30f.core import Core
+from emu.dspic30f.jit.counters.cycle_counters import BoundaryCounter
 from emu.dspic30f.jit.environment import (
     ARRIVED,
     AT_BOUNDARY,
@@ -30,7 +31,6 @@ from emu.dspic30f.jit.exit_reasons import (
     UNFINISHED as UNFINISHED_EXIT,
 )
 from emu.dspic30f.jit.translate.boundary import DONE, PYTHON, UNFINISHED, boundary_text
-from emu.dspic30f.jit.translate.cycle_counters import BoundaryCounter
 from emu.system.events import NEVER
 
 DISPATCH: Final = """

@@ -18,9 +18,9 @@ from straight_firmware import straight_firmware
 
 from emu.dspic30f.jit.engine import JitEngine
 from emu.dspic30f.jit.environment import ENV_WORDS
+from emu.dspic30f.jit.ir.values import Number
 from emu.dspic30f.jit.translate import function
 from emu.dspic30f.jit.translate.function import Translator
-from emu.dspic30f.jit.translate.values import Number
 from emu.machine.machine import Machine
 
 EXECUTED: Final = ENV_WORDS - 1

@@ -1,1 +1,1 @@
-"""Translation of a region of instructions to LLVM IR: builder, lazy flags, polling loops, boundaries, counters."""
+"""Translation of a region of instructions to a function: blocks, flow, REPEAT, polling loops, boundaries, hooks."""

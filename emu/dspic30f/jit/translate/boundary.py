@@ -12,9 +12,9 @@ from typing import Final
 from emu.dspic30f.core import Core
 from emu.dspic30f.exceptions import exceptions
 from emu.dspic30f.exceptions.power import DRAIN_CYCLES
-from emu.dspic30f.jit.translate.cycle_counters import BoundaryCounter
-from emu.dspic30f.jit.translate.rule_emitter import BoundaryEmitter
-from emu.dspic30f.jit.translate.values import Emitter, Value, truth, wide
+from emu.dspic30f.jit.counters.cycle_counters import BoundaryCounter
+from emu.dspic30f.jit.ir.rule_emitter import BoundaryEmitter
+from emu.dspic30f.jit.ir.values import Emitter, Value, truth, wide
 from emu.dspic30f.state.state import IDLE, RUN, STACK_POINTER
 from emu.system.events import NEVER
 from emu.system.rules import Cell, Number, cell_of, event_slot

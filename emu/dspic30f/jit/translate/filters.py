@@ -6,19 +6,16 @@ registers without a rule that computes them, and device registers while an event
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from operator import eq, ge, gt, le, lt, ne
-from typing import Any, Final
+from typing import Final
 
-from emu.dspic30f.jit.translate.builder import NeedsInterpreter
+from emu.dspic30f.jit.ir.builder import NeedsInterpreter
+from emu.dspic30f.jit.ir.comparison import compare
+from emu.dspic30f.jit.ir.rule_emitter import AccessEmitter
+from emu.dspic30f.jit.ir.values import Number, truth
+from emu.dspic30f.jit.ir.variables import pointer
 from emu.dspic30f.jit.translate.frame import FunctionFrame
-from emu.dspic30f.jit.translate.rule_emitter import AccessEmitter
-from emu.dspic30f.jit.translate.values import Emitter, Number, truth
-from emu.dspic30f.jit.translate.variables import pointer
 from emu.dspic30f.state.data_space import W_END
 from emu.system.filters import Comparison, Filter
-
-_COMPARE: Final[dict[str, Callable[[Any, Any], Any]]] = {"==": eq, "!=": ne, "<": lt, "<=": le, ">": gt, ">=": ge}
 
 
 def some_filter_holds(f: FunctionFrame, filters: tuple[Filter, ...], calls: str) -> Number:
@@ -35,34 +32,22 @@ def some_filter_holds(f: FunctionFrame, filters: tuple[Filter, ...], calls: str)
     return result
 
 
-def compare(e: Emitter, one: Comparison, value: Number) -> Number:
-    """Emit the comparison of a number of `one.size` bytes, of which it may select a field."""
-    bits = 8 * one.size
-    if one.field is not None:
-        bits, lsb = one.field
-        value = (value >> lsb) & ((1 << bits) - 1)
-    if one.is_signed:
-        value = (value ^ 1 << bits - 1) - (1 << bits - 1)
-    result: Number = _COMPARE[one.operator](value, one.number)
-    return result
-
-
 def _comparison(f: FunctionFrame, one: Comparison, calls: str) -> Number:
     """Emit one comparison; 1 if native code cannot evaluate it."""
     e, first = f.e, f.layout.ram[0]
     if one.base is not None:
         return _in_frame(f, one, one.base)
     if one.address >= first:
-        return compare(e, one, e.load(pointer(e, one.address), 8 * one.size))
+        return compare(one, e.load(pointer(e, one.address), 8 * one.size))
     if one.address < W_END:
-        return compare(e, one, _registers(f, one.address, one.size))
+        return compare(one, _registers(f, one.address, one.size))
     try:
         word = _sfr(f, one.address & ~1, calls)
     except NeedsInterpreter:
         return 1
     due = e.let(f"icmp ule i64 %before, {f.v.get('cycle').text}", bit=True)
     low = word >> 8 if one.address & 1 else word
-    return compare(e, one, low & ((1 << 8 * one.size) - 1)) | due
+    return compare(one, low & ((1 << 8 * one.size) - 1)) | due
 
 
 def _in_frame(f: FunctionFrame, one: Comparison, base: int) -> Number:
@@ -71,7 +56,7 @@ def _in_frame(f: FunctionFrame, one: Comparison, base: int) -> Number:
     ea = (f.v.get(f"W{base}") + one.address) & 0xFFFF
     inside = (ea >= first) & (ea <= end - one.size)
     found = e.load(pointer(e, e.select(inside, ea, first)), 8 * one.size)
-    return compare(e, one, found) | (inside == 0)
+    return compare(one, found) | (inside == 0)
 
 
 def _registers(f: FunctionFrame, address: int, size: int) -> Number:

@@ -5,13 +5,13 @@ from __future__ import annotations
 from typing import Final
 
 from emu.dspic30f.isa.builder import Context
+from emu.dspic30f.jit.counters.cycle_counters import CycleCounter
 from emu.dspic30f.jit.exit_reasons import CHANGED, NEXT
+from emu.dspic30f.jit.ir.builder import LlvmBuilder
+from emu.dspic30f.jit.ir.values import Emitter, Number, Value, truth, wide
+from emu.dspic30f.jit.ir.variables import MemoryVariables, Variables, pointer
 from emu.dspic30f.jit.machine_layout import MachineLayout
-from emu.dspic30f.jit.translate.builder import LlvmBuilder
-from emu.dspic30f.jit.translate.cycle_counters import CycleCounter
 from emu.dspic30f.jit.translate.region import Region
-from emu.dspic30f.jit.translate.values import Emitter, Number, Value, truth, wide
-from emu.dspic30f.jit.translate.variables import MemoryVariables, Variables, pointer
 
 
 class FunctionFrame:

@@ -13,6 +13,7 @@ from typing import Final
 from emu.dspic30f.interpreter import flow_rules
 from emu.dspic30f.isa.builder import Context
 from emu.dspic30f.isa.flow import Branch, Call, ClearWatchdog, Disi, Flow, Goto, Repeat, Return, Skip, Sleep
+from emu.dspic30f.jit.counters.cycle_counters import CycleCounter
 from emu.dspic30f.jit.environment import ARRIVED, NOWHERE, RESUME
 from emu.dspic30f.jit.exit_reasons import (
     ARRIVE,
@@ -25,19 +26,18 @@ from emu.dspic30f.jit.exit_reasons import (
     NEXT,
     RETFIE,
 )
+from emu.dspic30f.jit.ir.builder import NeedsInterpreter
+from emu.dspic30f.jit.ir.indirect_sfr import interrupt_requested
+from emu.dspic30f.jit.ir.rule_emitter import AccessEmitter, LlvmRulePaths
+from emu.dspic30f.jit.ir.values import Emitter, Number, Value, truth, wide
+from emu.dspic30f.jit.ir.variables import pointer
 from emu.dspic30f.jit.machine_layout import MachineLayout
-from emu.dspic30f.jit.translate.builder import NeedsInterpreter
-from emu.dspic30f.jit.translate.cycle_counters import CycleCounter
 from emu.dspic30f.jit.translate.filters import some_filter_holds
 from emu.dspic30f.jit.translate.frame import FunctionFrame
-from emu.dspic30f.jit.translate.indirect_sfr import interrupt_requested
 from emu.dspic30f.jit.translate.polling import empty_loops
 from emu.dspic30f.jit.translate.region import Region, Step
 from emu.dspic30f.jit.translate.repeat import RepeatTranslator
-from emu.dspic30f.jit.translate.rule_emitter import AccessEmitter, LlvmRulePaths
 from emu.dspic30f.jit.translate.trace_block import TraceItem, taken_cost, trace_block
-from emu.dspic30f.jit.translate.values import Emitter, Number, Value, truth, wide
-from emu.dspic30f.jit.translate.variables import pointer
 from emu.dspic30f.state.data_space import W_END
 from emu.dspic30f.state.state import IDLE, IPL3, NOT_REPEATING, PC_MASK
 from emu.system.events import NEVER

@@ -13,11 +13,11 @@ from typing import Final
 from emu.dspic30f.interpreter import flow_rules
 from emu.dspic30f.isa.builder import Context, Size
 from emu.dspic30f.isa.flow import Branch, Goto, Skip
+from emu.dspic30f.jit.ir.builder import LlvmBuilder, NeedsInterpreter
+from emu.dspic30f.jit.ir.values import Emitter, Number, Value
+from emu.dspic30f.jit.ir.variables import Variables
 from emu.dspic30f.jit.machine_layout import MachineLayout
-from emu.dspic30f.jit.translate.builder import LlvmBuilder, NeedsInterpreter
 from emu.dspic30f.jit.translate.region import Region, Step
-from emu.dspic30f.jit.translate.values import Emitter, Number, Value
-from emu.dspic30f.jit.translate.variables import Variables
 
 MAX_LOOP: Final = 12
 """Maximum number of instructions in a loop that is examined; polling loops are short."""

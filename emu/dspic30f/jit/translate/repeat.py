@@ -12,13 +12,13 @@ from typing import Final
 from emu.dspic30f.interpreter import flow_rules
 from emu.dspic30f.isa.flow import Repeat
 from emu.dspic30f.jit.exit_reasons import BOUNDARY_WORK, DEADLINE
-from emu.dspic30f.jit.translate.builder import LlvmBuilder, NeedsInterpreter
-from emu.dspic30f.jit.translate.deferred import DeferredEffects
+from emu.dspic30f.jit.ir.builder import LlvmBuilder, NeedsInterpreter
+from emu.dspic30f.jit.ir.deferred import DeferredEffects
+from emu.dspic30f.jit.ir.rule_emitter import LlvmRulePaths
+from emu.dspic30f.jit.ir.values import Emitter, Number, Value, wide
+from emu.dspic30f.jit.ir.variables import MemoryVariables
 from emu.dspic30f.jit.translate.frame import FunctionFrame
 from emu.dspic30f.jit.translate.region import Step
-from emu.dspic30f.jit.translate.rule_emitter import LlvmRulePaths
-from emu.dspic30f.jit.translate.values import Emitter, Number, Value, wide
-from emu.dspic30f.jit.translate.variables import MemoryVariables
 from emu.dspic30f.state.state import RA
 
 DIVIDE_COUNT: Final = 17

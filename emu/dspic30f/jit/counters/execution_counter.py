@@ -9,9 +9,9 @@ from __future__ import annotations
 
 from typing import Final
 
+from emu.dspic30f.jit.counters.cycle_counters import CycleCounter
 from emu.dspic30f.jit.environment import ACCOUNTING
-from emu.dspic30f.jit.translate.cycle_counters import CycleCounter
-from emu.dspic30f.jit.translate.values import Emitter, Number, Value
+from emu.dspic30f.jit.ir.values import Emitter, Number, Value
 
 
 class ExecutionCounter(CycleCounter):

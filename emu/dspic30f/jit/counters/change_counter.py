@@ -11,13 +11,13 @@ from collections.abc import Mapping
 from typing import Final
 
 from emu.dspic30f.change_log import BOUNDARY, COUNT, ENTRY_WORDS, ROOM, SEEN, ChangeLog, Watched, WatchedNumber
+from emu.dspic30f.jit.counters.cycle_counters import BoundaryCounter, CycleCounter
 from emu.dspic30f.jit.environment import ACCOUNTING
 from emu.dspic30f.jit.exit_reasons import CHANGED
-from emu.dspic30f.jit.translate.cycle_counters import BoundaryCounter, CycleCounter
-from emu.dspic30f.jit.translate.deferred import DeferredEffects
-from emu.dspic30f.jit.translate.filters import compare
-from emu.dspic30f.jit.translate.values import Emitter, Number, Value, truth, wide
-from emu.dspic30f.jit.translate.variables import pointer
+from emu.dspic30f.jit.ir.comparison import compare
+from emu.dspic30f.jit.ir.deferred import DeferredEffects
+from emu.dspic30f.jit.ir.values import Emitter, Number, Value, truth, wide
+from emu.dspic30f.jit.ir.variables import pointer
 from emu.dspic30f.state.state import IPL3, IPL_MASK, RUN
 
 
@@ -97,7 +97,7 @@ class ChangeCounter(CycleCounter):
             holds: Number = 1
             for comparison in log.leaves:
                 found = e.load(pointer(e, comparison.address), 8 * comparison.size)
-                holds = compare(e, comparison, found) & holds
+                holds = compare(comparison, found) & holds
             leaves = holds | leaves
         e.end(f"ret i1 {truth(leaves)}")
         parameters = "ptr noalias %rec, ptr noalias %log, i64 %cycle, i64 %where, i64 %hits"

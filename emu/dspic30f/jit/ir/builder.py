@@ -14,11 +14,11 @@ from emu.dspic30f.interpreter import flow_rules
 from emu.dspic30f.isa.builder import Context, Side, Size
 from emu.dspic30f.jit.environment import INDIRECT_SFR
 from emu.dspic30f.jit.exit_reasons import INTERPRET
+from emu.dspic30f.jit.ir.deferred import DeferredEffects, IndirectStore
+from emu.dspic30f.jit.ir.rule_emitter import AccessEmitter, LlvmRulePaths
+from emu.dspic30f.jit.ir.values import Emitter, Number, Value, truth, wide
+from emu.dspic30f.jit.ir.variables import Variables, pointer
 from emu.dspic30f.jit.machine_layout import MachineLayout
-from emu.dspic30f.jit.translate.deferred import DeferredEffects, IndirectStore
-from emu.dspic30f.jit.translate.rule_emitter import AccessEmitter, LlvmRulePaths
-from emu.dspic30f.jit.translate.values import Emitter, Number, Value, truth, wide
-from emu.dspic30f.jit.translate.variables import Variables, pointer
 from emu.dspic30f.state.data_space import W_END
 from emu.dspic30f.state.registers import NSTDIS
 from emu.dspic30f.state.state import FLAGS, SA, SAB, SB, STACK_POINTER

@@ -9,8 +9,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Final
 
-from emu.dspic30f.jit.translate.lazy_flags import FLAG_ENCODING, decode_flag, encode_flag
-from emu.dspic30f.jit.translate.values import Emitter, Number, Value, truth, wide
+from emu.dspic30f.jit.ir.lazy_flags import FLAG_ENCODING, decode_flag, encode_flag
+from emu.dspic30f.jit.ir.values import Emitter, Number, Value, truth, wide
 from emu.dspic30f.state.state import FLAGS, OAB, SAB
 
 ACCUMULATOR_FLAGS: Final = ("OA", "OB", "SA", "SB")

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from typing import Final, Literal
 
-from emu.dspic30f.jit.translate.values import Emitter, Number, Value, truth, wide
+from emu.dspic30f.jit.ir.values import Emitter, Number, Value, truth, wide
 
 FLAG_ENCODING: Final[dict[str, tuple[Literal["zero", "bit", "above"], int]]] = {
     "C": ("above", 16), "Z": ("zero", 0), "OV": ("bit", 15), "N": ("above", 15), "DC": ("bit", 8),

@@ -11,10 +11,10 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Final, Protocol
 
 from emu.dspic30f.interpreter.rule_paths import RulePaths
+from emu.dspic30f.jit.ir.deferred import DeferredEffects
+from emu.dspic30f.jit.ir.values import Emitter, Number, Value, truth, wide
+from emu.dspic30f.jit.ir.variables import pointer
 from emu.dspic30f.jit.machine_layout import MachineLayout
-from emu.dspic30f.jit.translate.deferred import DeferredEffects
-from emu.dspic30f.jit.translate.values import Emitter, Number, Value, truth, wide
-from emu.dspic30f.jit.translate.variables import pointer
 from emu.dspic30f.state.state import STACK_POINTER
 from emu.system.rules import Cell, EventSlot, cell_of
 

@@ -9,9 +9,9 @@ from collections.abc import Mapping
 from typing import Final
 
 from emu.dspic30f.instruction_log import CORE_BYTES, COUNT, ENTRY_BYTES, FIRST_ENTRY
+from emu.dspic30f.jit.counters.cycle_counters import BoundaryCounter, CycleCounter
 from emu.dspic30f.jit.environment import ACCOUNTING
-from emu.dspic30f.jit.translate.cycle_counters import BoundaryCounter, CycleCounter
-from emu.dspic30f.jit.translate.values import Emitter
+from emu.dspic30f.jit.ir.values import Emitter
 
 _LOG: Final = """declare void @llvm.memcpy.p0.p0.i64(ptr, ptr, i64, i1)
 define internal void @log(ptr noalias %rec, ptr noalias %log, i64 %pc) noinline {{

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from emu.dspic30f.isa.builder import Size
-from emu.dspic30f.jit.translate.values import Number, Value
+from emu.dspic30f.jit.ir.values import Number, Value
 
 
 class IndirectStore(NamedTuple):

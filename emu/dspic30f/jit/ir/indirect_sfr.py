@@ -15,11 +15,11 @@ from collections.abc import Callable, Mapping
 from typing import Final
 
 from emu.dspic30f.core import Core
+from emu.dspic30f.jit.ir.builder import CALLING_CONVENTION
+from emu.dspic30f.jit.ir.rule_emitter import BoundaryEmitter
+from emu.dspic30f.jit.ir.values import Emitter, Number, Value, truth, wide
+from emu.dspic30f.jit.ir.variables import pointer
 from emu.dspic30f.jit.machine_layout import MachineLayout, SfrAccess
-from emu.dspic30f.jit.translate.builder import CALLING_CONVENTION
-from emu.dspic30f.jit.translate.rule_emitter import BoundaryEmitter
-from emu.dspic30f.jit.translate.values import Emitter, Number, Value, truth, wide
-from emu.dspic30f.jit.translate.variables import pointer
 from emu.system.rules import Cell, Rule
 
 LANES: Final = (0xFFFF, 0x00FF, 0xFF00)

@@ -21,8 +21,8 @@ from emu.dspic30f.cycle_log import (
     SLEPT,
 )
 from emu.dspic30f.jit.environment import ACCOUNTING, INTERRUPTS
-from emu.dspic30f.jit.translate.deferred import DeferredEffects
-from emu.dspic30f.jit.translate.values import Emitter, Number, Value, wide
+from emu.dspic30f.jit.ir.deferred import DeferredEffects
+from emu.dspic30f.jit.ir.values import Emitter, Number, Value, wide
 from emu.dspic30f.state.state import IPL3, IPL_MASK
 
 RowOf = Callable[[int], int]

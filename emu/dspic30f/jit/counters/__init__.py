@@ -1,0 +1,1 @@
+"""Counters and logs in native code: cycles, executions, changes of numbers, instructions."""
