@@ -44,9 +44,15 @@ void avr_power_on(struct avr *m)
     find_next_due(m);
 }
 
-// Add an input at cycle `at`. Return 0, or -1 if there is no room. Inputs of the past come at once.
+// Add an input at cycle `at`. Return 0, or -1 if there is no room. Inputs of the past come at once. A second voltage of
+// a channel at the same cycle replaces the first, so they need no more room than one at a machine that does not run.
 i64 avr_input(struct avr *m, u64 at, i64 kind, i64 value)
 {
+    u32 last = (m->input_first + m->input_count + INPUT_ROOM - 1) % INPUT_ROOM;
+    if (m->input_count && kind >= INPUT_ANALOG && m->input_kind[last] == kind && m->input_cycle[last] == at) {
+        m->input_value[last] = (u32)value;
+        return 0;
+    }
     if (m->input_count == INPUT_ROOM)
         return -1;
     u32 place = m->input_count++;

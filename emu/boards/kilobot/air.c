@@ -8,11 +8,12 @@ typedef i64 (*run_function)(struct avr *m, const struct insn *code, u64 until);
 typedef i64 (*input_function)(struct avr *m, u64 at, i64 kind, i64 value);
 
 // MARGIN: an instruction may end so many ticks behind the goal of its robot; light up to there is known.
-enum { EDGES = 256, ECHO = 9, MARGIN = 8 };
+enum { ECHO = 9, MARGIN = 8 };
 enum { LAMP = 0xFFFFFFFF }; // sender of light that no robot sends
 enum { INPUT_ANALOG = 2, CH_HIGH_GAIN = 0, CH_LOW_GAIN = 1, CH_AIN0 = 9 };
 enum { RUN_LIMIT, RUN_FAULT, RUN_HALT, RUN_LOG, RUN_PROGRAM, RUN_LIGHT }; // results of avr_run
 enum { LIT_UV = 1000000, DARK_UV = 0 };
+#define STOPPED (1ULL << 62) // a tick after the end of every run
 
 struct edge {
     u64 at; // ticks
@@ -24,7 +25,7 @@ struct edge {
 struct link { // what a receiver gets of a sender
     u32 high_uv, low_uv;
     u32 loss;   // of 65,536 pulses
-    u32 hidden; // the pulse that is on the way is lost
+    u32 shown;  // the receiver got the light of an emitter that is still on
 };
 
 struct robot {
@@ -36,7 +37,7 @@ struct robot {
     u32 lights, edge_count;
     u64 reached; // tick up to which the robot has run
     u64 pulses;  // light pulses it has sent
-    struct edge edges[EDGES];
+    struct edge *edges; // `room` of them
 };
 
 struct air {
@@ -46,7 +47,7 @@ struct air {
     u64 *acts;          // when each robot can send light at the earliest
     run_function run;
     input_function input;
-    u64 delay, seed;
+    u64 delay, seed, room;
     u64 lost_edges; // edges for which a receiver had no room
 };
 
@@ -97,14 +98,14 @@ static int is_before(const struct edge *e, const struct edge *other)
     return e->at != other->at ? e->at < other->at : e->sender < other->sender;
 }
 
-// A robot that is stopped or has no power yet receives nothing.
-static void add_edge(struct air *a, struct robot *r, struct edge edge)
+// Return whether the robot receives the edge: one that is stopped or has no power yet does not.
+static int add_edge(struct air *a, struct robot *r, struct edge edge)
 {
     if (edge.at < r->reached)
-        return;
-    if (r->edge_count == EDGES) {
+        return 0;
+    if (r->edge_count == a->room) {
         a->lost_edges++;
-        return;
+        return 0;
     }
     u32 place = r->edge_count++;
     while (place && is_before(&edge, r->edges + place - 1)) {
@@ -113,23 +114,29 @@ static void add_edge(struct air *a, struct robot *r, struct edge edge)
     }
     r->edges[place] = edge;
     note_when_it_acts(a, r);
+    return 1;
 }
 
-// Give the edges up to tick `until` to the robot's inputs. The comparator sees light or darkness; strength stays.
+// Give the edges up to tick `until` to the robot's inputs, those of one tick together. The comparator sees light or
+// darkness; strength stays.
 static void deliver(struct air *a, struct robot *r, u64 until)
 {
     u32 done = 0;
-    for (; done < r->edge_count && r->edges[done].at <= until; done++) {
-        const struct edge *e = r->edges + done;
-        u64 cycle = cycle_at(r, e->at);
+    while (done < r->edge_count && r->edges[done].at <= until) {
+        const struct edge *brightest = 0;
+        u64 at = r->edges[done].at, cycle = cycle_at(r, at);
         u32 before = r->lights;
         i64 lost = 0;
-        if (e->change > 0) {
-            r->lights++;
-            lost |= a->input(r->avr, cycle, INPUT_ANALOG + CH_HIGH_GAIN, e->high_uv);
-            lost |= a->input(r->avr, cycle, INPUT_ANALOG + CH_LOW_GAIN, e->low_uv);
-        } else if (r->lights)
-            r->lights--;
+        for (; done < r->edge_count && r->edges[done].at == at; done++) {
+            const struct edge *e = r->edges + done;
+            r->lights += (u32)e->change;
+            if (e->change > 0 && (!brightest || e->high_uv > brightest->high_uv))
+                brightest = e;
+        }
+        if (brightest) {
+            lost |= a->input(r->avr, cycle, INPUT_ANALOG + CH_HIGH_GAIN, brightest->high_uv);
+            lost |= a->input(r->avr, cycle, INPUT_ANALOG + CH_LOW_GAIN, brightest->low_uv);
+        }
         if (!before != !r->lights)
             lost |= a->input(r->avr, cycle, INPUT_ANALOG + CH_AIN0, r->lights ? LIT_UV : DARK_UV);
         a->lost_edges += lost != 0;
@@ -139,34 +146,45 @@ static void deliver(struct air *a, struct robot *r, u64 until)
     r->edge_count -= done;
 }
 
-// A robot's emitter went on or off.
-static void emit(struct air *a, i64 sender)
+// A robot's emitter goes on (+1) or off (-1) at a tick. Return whether another robot receives that.
+static int emit(struct air *a, i64 sender, u64 at, i32 change)
 {
     struct robot *s = a->robots + sender;
-    u64 at = tick_of(s, s->avr->light_cycle);
-    i32 change = s->avr->lit ? 1 : -1;
+    int received = 0;
     s->pulses += change > 0;
     for (i64 n = 0; n < a->count; n++) {
         struct link *l = a->links + sender * a->count + n;
-        if (!l->high_uv && !l->low_uv)
+        if (change < 0 ? !l->shown : !l->high_uv && !l->low_uv)
+            continue; // light that was received ends, however far the sender is by then
+        if (change > 0 && l->loss && (draw(a, (u64)(sender * a->count + n), s->pulses) & 0xFFFF) < l->loss)
             continue;
-        if (change > 0)
-            l->hidden = l->loss && (draw(a, (u64)(sender * a->count + n), s->pulses) & 0xFFFF) < l->loss;
-        if (!l->hidden)
-            add_edge(a, a->robots + n,
-                     (struct edge){at + (n == sender ? ECHO : a->delay), l->high_uv, l->low_uv, change, (u32)sender});
+        struct edge edge = {at + (n == sender ? ECHO : a->delay), l->high_uv, l->low_uv, change, (u32)sender};
+        l->shown = add_edge(a, a->robots + n, edge) && change > 0;
+        received |= n != sender;
     }
-    s->avr->light_changed = 0;
+    return received;
+}
+
+// Stop a robot for good: its light goes out, and it receives no more.
+void air_stop(struct air *a, i64 index)
+{
+    struct robot *r = a->robots + index;
+    if (r->avr->lit)
+        emit(a, index, r->reached, -1);
+    r->avr->lit = 0;
+    r->reached = STOPPED;
 }
 
 // Light at one robot that no robot has sent: from tick `at` for `ticks`.
 void air_flash(struct air *a, i64 receiver, i64 at, i64 ticks, i64 high_uv, i64 low_uv)
 {
-    add_edge(a, a->robots + receiver, (struct edge){(u64)at, (u32)high_uv, (u32)low_uv, 1, LAMP});
-    add_edge(a, a->robots + receiver, (struct edge){(u64)(at + ticks), (u32)high_uv, (u32)low_uv, -1, LAMP});
+    struct edge on = {(u64)at, (u32)high_uv, (u32)low_uv, 1, LAMP}, off = on;
+    off.at += (u64)ticks, off.change = -1;
+    if (add_edge(a, a->robots + receiver, on))
+        add_edge(a, a->robots + receiver, off);
 }
 
-// Run one robot to tick `goal`. Return 0, or 1 if Python must handle its state (fault, log, new program).
+// Run one robot to tick `goal`, or as far as no answer to its own light can arrive. Return 0, or 1 if Python must handle its state (fault, log, new program).
 static int run_robot(struct air *a, i64 index, u64 goal)
 {
     struct robot *r = a->robots + index;
@@ -178,9 +196,12 @@ static int run_robot(struct air *a, i64 index, u64 goal)
         if (result == RUN_HALT) // only light can wake it
             r->avr->cycle = cycle > r->avr->cycle ? cycle : r->avr->cycle;
         u64 reached = tick_of(r, r->avr->cycle);
-        if (result == RUN_LIGHT)
-            emit(a, index);
-        else if (result != RUN_LIMIT && result != RUN_HALT) {
+        if (result == RUN_LIGHT) {
+            u64 at = tick_of(r, r->avr->light_cycle), answered = at + 2 * a->delay - MARGIN;
+            r->avr->light_changed = 0;
+            if (emit(a, index, at, r->avr->lit ? 1 : -1) && answered < goal)
+                goal = answered;
+        } else if (result != RUN_LIMIT && result != RUN_HALT) {
             r->reached = reached;
             return 1;
         } else if (reached < piece)

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Callable, Sequence
-from ctypes import Structure, addressof, c_int32, c_int64, c_uint32, c_uint64, c_void_p
+from ctypes import Structure, addressof, c_int32, c_int64, c_uint32, c_uint64, c_void_p, sizeof
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -45,12 +45,10 @@ EMITTERS: Final = 0xC7
 """Pins of port B that may be emitters (kilobot.md §1)."""
 PULSE_TICKS: Final = 9
 EDGES: Final = 256
-"""Room for edges of light that are on their way to a robot (air.c)."""
+"""Room for edges of light that are on their way to a robot, and two for each other robot (air.c)."""
 ADC6, ADC7, AIN1 = 6, 7, 10
 LOSS_ONE: Final = 1 << 16
 ONE_RATE: Final = 1 << 32
-NEVER: Final = 1 << 62
-"""A tick after the end of every run."""
 
 
 class KilobotFaultError(Exception):
@@ -72,7 +70,7 @@ class _Edge(Structure):
 class _Link(Structure):
     """`struct link` of air.c."""
 
-    _fields_ = [(name, c_uint32) for name in ("high_uv", "low_uv", "loss", "hidden")]
+    _fields_ = [(name, c_uint32) for name in ("high_uv", "low_uv", "loss", "shown")]
     high_uv: int
     low_uv: int
     loss: int
@@ -84,11 +82,10 @@ class _Robot(Structure):
     _fields_ = [("avr", c_void_p), ("code", c_void_p),
                 *((name, c_uint64) for name in ("on_at", "rate", "period")),
                 ("lights", c_uint32), ("edge_count", c_uint32), ("reached", c_uint64), ("pulses", c_uint64),
-                ("edges", _Edge * EDGES)]  # fmt: skip
+                ("edges", c_void_p)]  # fmt: skip
     code: int
     on_at: int
     period: int
-    reached: int
     pulses: int
 
 
@@ -96,7 +93,7 @@ class _Air(Structure):
     """`struct air` of air.c."""
 
     _fields_ = [("count", c_int64), *((name, c_void_p) for name in ("robots", "links", "acts", "run", "input")),
-                ("delay", c_uint64), ("seed", c_uint64), ("lost_edges", c_uint64)]  # fmt: skip
+                *((name, c_uint64) for name in ("delay", "seed", "room", "lost_edges"))]  # fmt: skip
     lost_edges: int
 
 
@@ -161,10 +158,13 @@ class KilobotSwarm:
             set_up(machine, robot.number, calibrated=robot.calibrated, duties=robot.duties)
             self.robots.append(machine)
         count = len(robots)
+        room = EDGES + 2 * count
+        self._edges = (_Edge * (room * count))()
         self._robots = (_Robot * count)(*(
             _Robot(addressof(machine.state), machine.program.address, int(robot.on_at * HZ),
-                   int(robot.clock * ONE_RATE), int(ONE_RATE / robot.clock), reached=int(robot.on_at * HZ))
-            for machine, robot in zip(self.robots, robots, strict=True)))  # fmt: skip
+                   int(robot.clock * ONE_RATE), int(ONE_RATE / robot.clock), reached=int(robot.on_at * HZ),
+                   edges=addressof(self._edges) + index * room * sizeof(_Edge))
+            for index, (machine, robot) in enumerate(zip(self.robots, robots, strict=True))))  # fmt: skip
         self._links = (_Link * (count * count))()
         words = (c_uint32 * (4 * count * count)).from_buffer(self._links)
         self._table = np.ctypeslib.as_array(words).reshape(count, count, 4) if count else None
@@ -173,7 +173,7 @@ class KilobotSwarm:
         self._air = _Air(
             count, addressof(self._robots), addressof(self._links), addressof(self._acts),
             address_of(functions["avr_run"]), address_of(functions["avr_input"]), delay,
-            seed * 2_654_435_761 % (1 << 63) | 1,
+            seed * 2_654_435_761 % (1 << 63) | 1, room,
         )  # fmt: skip
         self._look_at(np.arange(count))
 
@@ -204,7 +204,7 @@ class KilobotSwarm:
 
     def stop(self, robot: int) -> None:
         """Stop a robot for good, as after a fault or without its battery. It sends and receives no more light."""
-        self._robots[robot].reached = NEVER
+        self._functions["air_stop"](addressof(self._air), robot)
 
     def flash(self, robot: int, after_us: float, distance: float = 0.0) -> None:
         """Let one robot receive a light pulse of 9 ticks in some us, as strong as of a robot at a distance in mm."""
@@ -283,4 +283,5 @@ def _code() -> dict[str, Callable[..., Any]]:
     """Return the functions of air.c."""
     text = "\n".join([TYPES, declaration(), '#line 1 "emu/boards/kilobot/air.c"',
                       Path(__file__).with_name("air.c").read_text("utf-8")])  # fmt: skip
-    return functions_of(text, "air", {"air_run": (INT, (ADDRESS, INT)), "air_flash": (None, (ADDRESS, *[INT] * 5))})
+    return functions_of(text, "air", {"air_run": (INT, (ADDRESS, INT)), "air_flash": (None, (ADDRESS, *[INT] * 5)),
+                                     "air_stop": (None, (ADDRESS, INT))})  # fmt: skip
