@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Final
 
 from arena.scene import geometry
@@ -11,7 +11,7 @@ from arena.scene.limits import LIMITS
 from arena.scene.robot_kind import KINDS
 from arena.scene.schema import INHERIT, NAMED, PLACES, ObjectKind, Points, RobotGroup
 from emu.boards.epuck.remote import KEYS
-from emu.boards.kilobot.messages import TYPES
+from emu.boards.kilobot.messages import MOST_UID, TYPES
 
 COLOUR: Final = re.compile(r"#[0-9a-fA-F]{6}")
 MOST_SECONDS: Final = 1e7
@@ -66,14 +66,17 @@ def wrong_points(value: Any) -> str:
     return ""
 
 
-def check_links(errors: TableErrors, links: Points, robots: int) -> None:
-    """Check the Bluetooth links between `robots` robots."""
+def check_links(errors: TableErrors, links: Points, kinds: Sequence[str]) -> None:
+    """Check the Bluetooth links between robots of some kinds."""
+    robots = len(kinds)
     taken: set[frozenset[float]] = set()
     for link in links:
         ends = frozenset(link)
         words = ""
         if len(link) != 2 or len(ends) != 2 or not all(end in range(robots) for end in ends):
             words = f"expected two different robots of 0 to {robots - 1}"
+        elif "kilobot" in (kinds[int(end)] for end in link):
+            words = "a Kilobot has no Bluetooth; its messages go by infrared light"
         elif ends in taken:
             words = "is listed twice"
         if words:
@@ -157,12 +160,25 @@ def check_group(errors: TableErrors, table: str, one: RobotGroup, number: int) -
     if not CONTROLLER.fullmatch(one.controller):
         words = f"{table}.controller is {one.controller!r}; expected A, B, the path of a .py file, or an entry point"
         raise errors.at(table, "controller", words, number)
-    if one.kind == "kilobot" and one.controller:
-        words = f"{table}.controller {one.controller!r} drives an e-puck; a Kilobot runs an `image`"
-        raise errors.at(table, "controller", words, number)
+    if one.kind == "kilobot":
+        check_kilobots(errors, table, one, number)
     if one.image and one.controller not in ("", "A", "B"):
         words = f"{table}.controller {one.controller!r} runs in Python; a group with an `image` runs firmware"
         raise errors.at(table, "controller", words, number)
+
+
+def check_kilobots(errors: TableErrors, table: str, one: RobotGroup, number: int) -> None:
+    """Check a table [[robots]] of Kilobots. Raises SceneError."""
+    if one.controller:
+        words = f"{table}.controller {one.controller!r} drives an e-puck; a Kilobot runs an `image`"
+        raise errors.at(table, "controller", words, number)
+    for key, value in (("selector", -1), ("remote", INHERIT), ("stimulus", INHERIT)):
+        if getattr(one, key) != value:
+            words = f"{table}.{key} has no effect on a Kilobot; it takes commands of `overhead` in [kilobots]"
+            raise errors.at(table, key, words, number)
+    if one.id_first + one.count - 1 > MOST_UID:
+        words = f"{table}.id_first is {one.id_first}: the UIDs of {one.count} Kilobots go beyond {MOST_UID}"
+        raise errors.at(table, "id_first", words, number)
 
 
 def check_kind(errors: TableErrors, table: str, one: ObjectKind, number: int) -> None:

@@ -381,7 +381,8 @@ def _checked(scene: Scene, errors: TableErrors) -> Scene:
         words = f"{scene.robots.count} robots and {scene.objects.count} objects; expected at most 1000 and 10000"
         raise errors.at("robots", "count", words)
     check_colour(errors, "robots", scene.robots, None)
-    check_links(errors, scene.bluetooth.links, scene.robots.count)
+    robots = range(scene.robots.count)
+    check_links(errors, scene.bluetooth.links, [scene.robot_kind(robot).name for robot in robots])
     check_off(errors, scene.start.off, scene.robots.count)
     if scene.arena.polygon:
         check_polygon(errors, "arena", scene.arena.polygon, None)

@@ -7,12 +7,11 @@ import json
 import sys
 from typing import Final
 
-from emu.boards.kilobot.messages import TYPES
+from emu.boards.kilobot.messages import MOST_UID, TYPES
 from emu.host.command import CommandError, Parser
 from emu.host.exit_status import DONE, FAULT, FAULT_AS_STATUS, INTERRUPTED, LIMIT_AS_STATUS
 
 BOARD: Final = "kilobot"
-MOST_UID: Final = 0xFFFF
 OWN: Final = ("ohc", "uid")
 """Options of the Kilobot alone."""
 SHARED: Final = ("image", "board", "seconds", "cycles", "json", "exit_code", "cache")

@@ -29,6 +29,8 @@ LONGEST_PAUSE: Final = 2_959
 TYPES: Final = {"boot": 0x80, "reset": 0x83, "sleep": 0x84, "wakeup": 0x85, "charge": 0x86, "voltage": 0x87,
                 "run": 0x88, "readuid": 0x89, "calibrate": 0x8A}  # fmt: skip
 """Message types of the overhead controller's commands."""
+MOST_UID: Final = 0xFFFF
+"""Greatest number of a robot: its EEPROM has two bytes for it."""
 OHC_GAP: Final = 48_000
 """Ticks between two messages of the overhead controller: 6 ms."""
 

@@ -195,6 +195,13 @@ def test_wrong_values_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture[
     assert "a Kilobot runs an `image`" in refused(tmp_path, '[[robots]]\nkind = "kilobot"\ncontroller = "A"\n')
     for text in ("1 run", "1 go 2", "1 run 2; 2 sleep 1", "x run 1", "1 run nan"):
         assert "kilobots.overhead: " in refused(tmp_path, f'[kilobots]\noverhead = "{text}"\n')
+    group = '[[robots]]\nkind = "kilobot"\nimage = "gradient"\n'
+    for line in ('stimulus = "x"', "selector = 3", 'remote = "ok"'):
+        assert f"robots.{line.split()[0]} has no effect on a Kilobot" in refused(tmp_path, f"{group}{line}\n")
+    text = refused(tmp_path, f"{group}count = 7\nid_first = 65530\n")
+    assert "scene.toml:6: robots.id_first is 65530: the UIDs of 7 Kilobots go beyond 65535" in text
+    links = f'[bluetooth]\nlinks = [[0, 1]]\n{group}[[robots]]\nplace = "poses"\nposes = [[10, 10]]\n'
+    assert "scene.toml:3: bluetooth.links: ['0', '1']: a Kilobot has no Bluetooth" in refused(tmp_path, links)
     path = tmp_path / "scene.toml"
     path.write_text('name = "test"\n[[robots]]\nkind = "kilobot"\n')
     assert main(["run", str(path), "--out", str(tmp_path / "out")]) == 2
