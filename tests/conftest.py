@@ -12,12 +12,12 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from skips import Skips
-from watchdog import Silence, WatchdogPlugin
 
 from emu.dspic30f.engines import NAMES, make_engine
 from emu.dspic30f.jit import engine as jit
 from emu.machine import machine
+from tests.skips import Skips
+from tests.watchdog import Silence, WatchdogPlugin
 
 COLLECT_EVERY = 100_000
 """Allocations between two garbage collections: with Python's 700, they take a tenth of the CPU time of the tests."""

@@ -9,12 +9,13 @@ import time
 from pathlib import Path
 
 import pytest
-from watchdog import SILENCE, Silence, Watchdog, cpu_of, tree_of
+
+from tests.watchdog import SILENCE, Silence, Watchdog, cpu_of, tree_of
 
 ROOT = Path(__file__).resolve().parents[1]
 PROGRAM = """
 import subprocess, sys
-from watchdog import Watchdog
+from tests.watchdog import Watchdog
 dog = Watchdog(cpu_limit=2.0, idle_limit=3.0, tick=0.5)
 dog.start()
 dog.begin("tests/test_it.py::test_hangs")

@@ -1,13 +1,11 @@
-"""Folders of shared helper modules, and a fixture of the emulator's tests: the folder of recorded vectors."""
+"""A fixture of the emulator's tests: the folder of recorded vectors."""
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 
 import pytest
 
-sys.path[:0] = [str(Path(__file__).with_name(folder)) for folder in ("cpu", "jit", "chips", "loader", "cli")]
 VECTORS = Path(__file__).resolve().parents[1] / "vectors"
 
 

@@ -6,13 +6,12 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any, Protocol
 
-from rowmachine import REGISTERS, RowMachine
-
 from emu.dspic30f.engines import NAMES
 from emu.dspic30f.jit.cache import ObjectCache
 from emu.dspic30f.jit.compiler import Compiler
 from emu.dspic30f.jit.engine import JitEngine
 from emu.machine.machine import Machine
+from tests.emu.rowmachine import REGISTERS, RowMachine
 
 RAM_START, RAM_END = 0x0800, 0x2800
 CORE = ("TBLPAG", "MODCON", "XMODSRT", "XMODEND", "YMODSRT", "YMODEND", "XBREV")

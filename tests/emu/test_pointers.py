@@ -10,11 +10,11 @@ from itertools import product
 from typing import Any
 
 import pytest
-from engines import ENGINES, OnMachine
 
 from emu.dspic30f.isa import codec, text
 from emu.dspic30f.isa.row import Insn, Row
 from emu.dspic30f.isa.table import ROWS
+from tests.emu.engines import ENGINES, OnMachine
 
 PC = 0x1000
 MODES = {"p": range(6), "q": range(6), "g": range(7), "h": range(7), "i": range(16), "j": range(16), "a": range(3)}

@@ -17,9 +17,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from engines import ENGINES, Engine
 
 from emu.dspic30f.isa import codec, text
+from tests.emu.engines import ENGINES, Engine
 
 RAM_START = 0x0800
 NATIVE_STRIDE = 499

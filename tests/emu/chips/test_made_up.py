@@ -5,10 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 
 import pytest
-from cpu_rig import assemble
-from engine_fuzz import check_pairs, check_programs
-from engine_pair import QuickCompiler, check_wild
-from made_up import FLASH_END, MADE_UP, RAM_END, SFR_END, Y_START
 
 from emu.chips.chip import Region
 from emu.chips.dspic30f6014a import DSPIC30F6014A
@@ -16,6 +12,10 @@ from emu.dspic30f.engines import NAMES
 from emu.dspic30f.isa.table import ROWS
 from emu.dspic30f.jit.engine import JitEngine
 from emu.machine.machine import Machine
+from tests.emu.chips.made_up import FLASH_END, MADE_UP, RAM_END, SFR_END, Y_START
+from tests.emu.cpu.cpu_rig import assemble
+from tests.emu.cpu.engine_fuzz import check_pairs, check_programs
+from tests.emu.jit.comparison.engine_pair import QuickCompiler, check_wild
 
 ENGINES = [name for name in NAMES if name != "auto"]
 NO_WATCHDOG = 0x7FFF

@@ -3,15 +3,10 @@
 from __future__ import annotations
 
 import re
-import sys
-from pathlib import Path
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "loader"))
-
-from elf_samples import ElfSample, Name, SampleSection, words
 
 from emu.chips.dspic30f6014a import SFRS
 from emu.dspic30f.isa.text import parse
+from tests.emu.loader.elf_samples import ElfSample, Name, SampleSection, words
 
 START = 0x100
 DEBUG_WORD = 0xDA4000

@@ -6,10 +6,10 @@ import math
 import pydoc
 
 import pytest
-from programs import ECHO, HELLO, SPIN, executable
 
 import emu
 from emu.boards.epuck.board import Epuck
+from tests.emu.cli.programs import ECHO, HELLO, SPIN, executable
 
 WORDS = """
 main:

@@ -10,8 +10,8 @@ from importlib.metadata import version
 from pathlib import Path
 
 import pytest
-from programs import SPIN, executable
 
+from tests.emu.cli.programs import SPIN, executable
 from tests.watchdog import HANG
 
 ROOT = Path(__file__).resolve().parents[3]

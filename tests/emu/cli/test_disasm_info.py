@@ -5,10 +5,10 @@ from __future__ import annotations
 import json
 
 import pytest
-from dwarf_samples import debug_sections
-from elf_samples import xc16_like
 
 from emu.cli import main
+from tests.emu.loader.dwarf_samples import debug_sections
+from tests.emu.loader.elf_samples import xc16_like
 
 
 @pytest.fixture

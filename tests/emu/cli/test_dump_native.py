@@ -6,9 +6,9 @@ import re
 from pathlib import Path
 
 import pytest
-from programs import SPIN, executable
 
 from emu.cli import main
+from tests.emu.cli.programs import SPIN, executable
 
 
 @pytest.fixture

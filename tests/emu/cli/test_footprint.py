@@ -6,13 +6,13 @@ import json
 from pathlib import Path
 
 import pytest
-from dwarf_samples import debug_sections
-from elf_samples import Name, xc16_like
 
 from emu.cli import main
 from emu.commands.info import describe
 from emu.image.footprint import UNKNOWN, pieces, totals
 from emu.image.loader import parse_image
+from tests.emu.loader.dwarf_samples import debug_sections
+from tests.emu.loader.elf_samples import Name, xc16_like
 
 
 @pytest.fixture

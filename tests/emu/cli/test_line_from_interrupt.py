@@ -8,9 +8,9 @@ from itertools import pairwise
 from pathlib import Path
 
 import pytest
-from programs import SETUP, executable
 
 from emu.api import load
+from tests.emu.cli.programs import SETUP, executable
 from tests.watchdog import HANG
 
 LINE = "swarm\n"

@@ -13,9 +13,9 @@ import time
 from pathlib import Path
 
 import pytest
-from programs import ECHO, HELLO, SPIN, executable
 
 from emu.cli import main
+from tests.emu.cli.programs import ECHO, HELLO, SPIN, executable
 from tests.watchdog import HANG
 
 ROOT = Path(__file__).resolve().parents[3]

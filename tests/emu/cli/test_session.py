@@ -8,7 +8,6 @@ import sys
 from pathlib import Path
 
 import pytest
-from programs import ECHO, SPIN, executable
 
 import emu
 import emu.api
@@ -18,6 +17,7 @@ from emu.run import session as sessions
 from emu.run.input_log import TimestampedInput
 from emu.run.session import Session
 from emu.run.uart_backends import ConsolePort
+from tests.emu.cli.programs import ECHO, SPIN, executable
 
 ROOT = Path(__file__).resolve().parents[3]
 

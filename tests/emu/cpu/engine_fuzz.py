@@ -8,12 +8,6 @@ DO and timer interrupts, and are compared at random cycles. The seed determines 
 from __future__ import annotations
 
 import random
-import sys
-from pathlib import Path
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "jit"))
-
-from engine_pair import QuickCompiler
 
 from emu.chips.chip import Chip
 from emu.chips.dspic30f6014a import DSPIC30F6014A
@@ -25,6 +19,7 @@ from emu.dspic30f.isa.table import ROWS
 from emu.dspic30f.jit.engine import JitEngine
 from emu.machine.machine import Machine
 from emu.machine.stops import Stop
+from tests.emu.jit.comparison.engine_pair import QuickCompiler
 
 PC = 0x4000
 INTERESTING = (0, 1, 2, 0x7F, 0x80, 0xFF, 0x100, 0x7FFF, 0x8000, 0xFFFE, 0xFFFF)

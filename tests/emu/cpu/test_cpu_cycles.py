@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import pytest
-from cpu_rig import RAM, Rig
+
+from tests.emu.cpu.cpu_rig import RAM, Rig
 
 
 @pytest.mark.parametrize(

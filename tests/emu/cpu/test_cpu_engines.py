@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import pytest
-from engine_fuzz import check_pairs, check_programs
 
 from emu.dspic30f.isa.table import ROWS
+from tests.emu.cpu.engine_fuzz import check_pairs, check_programs
 
 
 @pytest.mark.slow

@@ -9,7 +9,8 @@ from __future__ import annotations
 from itertools import pairwise
 
 import pytest
-from cpu_rig import RAM, STACK, TABLE, Rig
+
+from tests.emu.cpu.cpu_rig import RAM, STACK, TABLE, Rig
 
 ISR = "isr: nop\nstay: bra stay"
 T1_VECTOR, T1_ALTERNATE = 0x1A, 0x9A

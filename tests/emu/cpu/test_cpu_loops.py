@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import pytest
-from cpu_rig import Rig
+
+from tests.emu.cpu.cpu_rig import Rig
 
 ISR = "isr: inc 0x1100\nbclr 0x84, #3\nretfie"
 DA, RA = 0x0200, 0x0010

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import pytest
-from cpu_rig import RAM, START, Rig
 
 from emu.machine.machine import Machine
+from tests.emu.cpu.cpu_rig import RAM, START, Rig
 
 
 def test_an_unknown_engine_is_refused() -> None:

@@ -4,7 +4,8 @@
 from __future__ import annotations
 
 import pytest
-from cpu_rig import RAM, Rig
+
+from tests.emu.cpu.cpu_rig import RAM, Rig
 
 STALLED, FREE = 3, 2
 """Cycles of two one-cycle instructions, with and without a stall."""

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import pytest
-from cpu_rig import RAM, STACK, START, Rig
+
+from tests.emu.cpu.cpu_rig import RAM, STACK, START, Rig
 
 OSCILLATOR, ADDRESS, STACK_ERROR, MATH = 0x06, 0x08, 0x0A, 0x0C
 OSCFAIL, STKERR, ADDRERR, MATHERR = 2, 4, 8, 16

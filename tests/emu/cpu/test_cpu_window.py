@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import pytest
-from cpu_rig import RAM, TABLE, Rig
+
+from tests.emu.cpu.cpu_rig import RAM, TABLE, Rig
 
 
 def windowed(engine: str, text: str, **w: int) -> Rig:

@@ -6,7 +6,6 @@ import random
 from typing import Any
 
 import pytest
-from cpu_rig import Rig
 
 from emu.dspic30f.interpreter import flow_rules
 from emu.dspic30f.interpreter.rule_paths import function_of
@@ -14,6 +13,7 @@ from emu.dspic30f.jit.engine import JitEngine
 from emu.dspic30f.state.state import NOT_REPEATING, RA, State
 from emu.machine.machine import Machine
 from emu.system.rules import INTEGER_OPERATIONS, Cell
+from tests.emu.cpu.cpu_rig import Rig
 
 
 class OnNumbers:

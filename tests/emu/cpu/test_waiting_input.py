@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from programs import executable
 
 import emu
 from emu.debug.history import History
@@ -14,6 +13,7 @@ from emu.inject.campaign import Campaign
 from emu.inject.faults import KINDS
 from emu.inject.trial import Trials
 from emu.peripherals.uart.rx_queue import CAPACITY
+from tests.emu.cli.programs import executable
 
 RECEIVER = """
     mov #0x8000, w0

@@ -6,12 +6,12 @@ import random
 from typing import Any
 
 import pytest
-from rowmachine import REGISTERS, RowMachine
-from samples import random_insn
 
 from emu.dspic30f.isa.builder import Context
 from emu.dspic30f.isa.row import Insn, Row
 from emu.dspic30f.isa.table import ROWS
+from tests.emu.isa.samples import random_insn
+from tests.emu.rowmachine import REGISTERS, RowMachine
 
 SAMPLES = 40
 CONTEXTS = (

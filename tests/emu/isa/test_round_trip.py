@@ -7,12 +7,12 @@ import random
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from samples import idle_fields, random_insn
 
 from emu.dspic30f.isa import codec, text
 from emu.dspic30f.isa.fields import Operands
 from emu.dspic30f.isa.row import Insn, Row
 from emu.dspic30f.isa.table import ROWS
+from tests.emu.isa.samples import idle_fields, random_insn
 
 SAMPLES = 60
 

@@ -8,11 +8,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from rowmachine import CORCON, REGISTERS, SR, RowMachine
 
 from emu.dspic30f.isa import codec, text
 from emu.dspic30f.isa.flow import ClearWatchdog, Disi, Reset, Sleep
 from emu.dspic30f.isa.table import BY_ID
+from tests.emu.rowmachine import CORCON, REGISTERS, SR, RowMachine
 
 GOLDEN = Path(__file__).resolve().parents[2] / "vectors" / "golden.csv"
 

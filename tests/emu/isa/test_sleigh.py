@@ -7,14 +7,14 @@ import re
 from pathlib import Path
 
 import pytest
-from samples import random_insn
 
 from emu.dspic30f.isa.row import Row
 from emu.dspic30f.isa.table import ROWS
+from tests.emu.isa.samples import random_insn
 
 pytest.importorskip("pypcode", reason="the independent decoder is not installed (extra: test)")
 
-from sleigh import disagreement
+from tests.emu.isa.sleigh import disagreement
 
 PAGE = Path(__file__).resolve().parents[3] / "docs" / "census.md"
 RANDOM_WORDS = 40_000

@@ -3,10 +3,19 @@
 from __future__ import annotations
 
 import pytest
-from engine_pair import Difference, InstructionObserver, Tally, advance, check_straight, check_wild, engine_pair
-from long_runs import check_long
-from straight_body import Shape
-from straight_firmware import straight_firmware
+
+from tests.emu.jit.comparison.engine_pair import (
+    Difference,
+    InstructionObserver,
+    Tally,
+    advance,
+    check_straight,
+    check_wild,
+    engine_pair,
+)
+from tests.emu.jit.comparison.long_runs import check_long
+from tests.emu.jit.comparison.straight_body import Shape
+from tests.emu.jit.comparison.straight_firmware import straight_firmware
 
 SHORT = Shape(instructions=250)
 

@@ -16,7 +16,7 @@ from emu.instruments.changes import log_changes
 from emu.instruments.vcd import WaveformRecorder
 from emu.machine.machine import Machine
 from emu.machine.stops import Stop
-from tests.emu.jit.random_firmware import load, random_firmware
+from tests.emu.jit.comparison.random_firmware import load, random_firmware
 from toolchain.driver import driver
 
 SOURCE = """

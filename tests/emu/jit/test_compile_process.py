@@ -12,10 +12,6 @@ import time
 from pathlib import Path
 
 import pytest
-from engine_pair import load
-from random_firmware import difference
-from straight_body import Shape
-from straight_firmware import straight_firmware
 
 from emu.dspic30f.jit import compiler as compiler_module
 from emu.dspic30f.jit.cache import ObjectCache
@@ -23,6 +19,10 @@ from emu.dspic30f.jit.compiler import MAX_DEATHS, Compiler, LoadedCode
 from emu.dspic30f.jit.engine import JitEngine
 from emu.host.disk_cache import SHELVES
 from emu.machine.machine import Machine
+from tests.emu.jit.comparison.engine_pair import load
+from tests.emu.jit.comparison.random_firmware import difference
+from tests.emu.jit.comparison.straight_body import Shape
+from tests.emu.jit.comparison.straight_firmware import straight_firmware
 from tests.watchdog import HANG
 
 IR = "define i64 @entry(ptr %rec, ptr %env) {{\n  ret i64 {}\n}}\n"

@@ -10,7 +10,7 @@ import emu
 from emu.dspic30f.jit.engine import JitEngine
 from emu.instruments.coverage import Counts, count_executions
 from emu.machine.machine import Machine
-from tests.emu.jit.random_firmware import load, random_firmware
+from tests.emu.jit.comparison.random_firmware import load, random_firmware
 from toolchain.driver import driver
 
 SOURCE = """

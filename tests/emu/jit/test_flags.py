@@ -5,14 +5,14 @@ from __future__ import annotations
 import itertools
 
 import pytest
-from engine_pair import engine_pair
-from flag_drills import FLAGS, Tally, all_pairs, asked, check, kind, pairs_of, rows, written
-from random_firmware import BY_SYNTAX, Firmware, difference, words_of
-from rowmachine import SR
 
 from emu.dspic30f.isa import codec
 from emu.dspic30f.isa.fields import Operands
 from emu.dspic30f.isa.row import Insn
+from tests.emu.jit.comparison.engine_pair import engine_pair
+from tests.emu.jit.comparison.flag_drills import FLAGS, Tally, all_pairs, asked, check, kind, pairs_of, rows, written
+from tests.emu.jit.comparison.random_firmware import BY_SYNTAX, Firmware, difference, words_of
+from tests.emu.rowmachine import SR
 
 
 @pytest.mark.parametrize("seed", range(3))

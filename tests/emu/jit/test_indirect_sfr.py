@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import pytest
-from cpu_rig import START, assemble
-from random_firmware import difference
 from test_native_code import eager, own_cache  # noqa: F401  (the fixture)
 
 from emu.chips.dspic30f6014a import DSPIC30F6014A
 from emu.dspic30f.jit.engine import JitEngine
 from emu.machine.machine import Machine
+from tests.emu.cpu.cpu_rig import START, assemble
+from tests.emu.jit.comparison.random_firmware import difference
 
 AT = {name: f"{sfr.address:#x}" for name, sfr in DSPIC30F6014A.sfrs.items()}
 

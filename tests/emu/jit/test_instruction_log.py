@@ -14,7 +14,7 @@ from emu.image.model import Image
 from emu.instruments.disassembly import instruction
 from emu.instruments.trace import HEADER, SILENT, Tracer
 from emu.machine.machine import Machine
-from tests.emu.jit.random_firmware import load, random_firmware
+from tests.emu.jit.comparison.random_firmware import load, random_firmware
 from toolchain.driver import driver
 
 HELLO = Path(__file__).parents[1] / "cli" / "hello.hex"

@@ -7,11 +7,20 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from random_firmware import Firmware, difference, literal, load, random_firmware, started, to_sfr, words_of
 
 from emu.dspic30f.jit.cache import ObjectCache
 from emu.dspic30f.jit.engine import JitEngine
 from emu.machine.machine import Machine
+from tests.emu.jit.comparison.random_firmware import (
+    Firmware,
+    difference,
+    literal,
+    load,
+    random_firmware,
+    started,
+    to_sfr,
+    words_of,
+)
 
 
 @pytest.fixture(autouse=True)

@@ -9,10 +9,6 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 
 import pytest
-from engine_pair import Difference, QuickCompiler, engine_pair
-from observed_runs import check_observed
-from programs import assembled, executable
-from random_firmware import BODY_WORDS, CODE, Firmware, difference, load, random_firmware, started, words_of
 
 import emu
 from emu.dap.breakpoints import Breakpoint
@@ -23,6 +19,19 @@ from emu.instruments.trace import Tracer
 from emu.instruments.vcd import WaveformRecorder
 from emu.machine.machine import Machine
 from emu.machine.stops import Stop
+from tests.emu.cli.programs import assembled, executable
+from tests.emu.jit.comparison.engine_pair import Difference, QuickCompiler, engine_pair
+from tests.emu.jit.comparison.observed_runs import check_observed
+from tests.emu.jit.comparison.random_firmware import (
+    BODY_WORDS,
+    CODE,
+    Firmware,
+    difference,
+    load,
+    random_firmware,
+    started,
+    words_of,
+)
 
 PEEKED = ("TMR1", "TMR2", "TMR3", "IFS0", "IFS1", "PORTD", "PORTF", "U1STA", "U1RXREG", "ADCON1", "INTTREG")
 """Registers whose values depend on device time."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import pytest
-from random_firmware import Firmware, difference, load, started, words_of
 from test_native_code import own_cache, pair  # noqa: F401  (the fixture)
 
 from emu.chips.dspic30f6014a import DSPIC30F6014A
@@ -14,6 +13,7 @@ from emu.dspic30f.jit.translate.polling import empty_loops
 from emu.dspic30f.jit.translate.region import discover
 from emu.dspic30f.state.modes import Modes
 from emu.machine.machine import Machine
+from tests.emu.jit.comparison.random_firmware import Firmware, difference, load, started, words_of
 
 IFS0, TMR1 = (DSPIC30F6014A.sfrs[name].address for name in ("IFS0", "TMR1"))
 FLAG = 0x900

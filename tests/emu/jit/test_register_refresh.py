@@ -6,13 +6,13 @@ from functools import partial
 
 import numpy as np
 import pytest
-from random_firmware import difference
 
 from emu.boards.epuck.board import Epuck
 from emu.dspic30f.isa.text import parse
 from emu.dspic30f.jit.environment import REFRESHED
 from emu.machine.machine import Machine
 from emu.system.native_handle import FRESH_ROOM
+from tests.emu.jit.comparison.random_firmware import difference
 
 LOOP = 0x200
 CYCLES = 160_000

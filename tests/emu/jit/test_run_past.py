@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import pytest
-from cpu_rig import START, assemble
-from random_firmware import difference, load, random_firmware
 
 from emu.chips.dspic30f6014a import DSPIC30F6014A
 from emu.dspic30f.jit.engine import JitEngine
 from emu.machine.machine import Machine
+from tests.emu.cpu.cpu_rig import START, assemble
+from tests.emu.jit.comparison.random_firmware import difference, load, random_firmware
 
 
 def machine(engine: str, seed: int) -> Machine:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from random_firmware import Firmware, difference, started, words_of
 from test_native_code import own_cache, pair  # noqa: F401  (the fixture)
 
 from emu.chips.dspic30f6014a import DSPIC30F6014A
@@ -14,6 +13,7 @@ from emu.dspic30f.jit.counting import CycleCounting
 from emu.dspic30f.jit.engine import JitEngine
 from emu.dspic30f.jit.translate.region import Region, discover
 from emu.dspic30f.jit.translate.trace_block import MAX_BRANCHES, MAX_SKIPPED, trace_block
+from tests.emu.jit.comparison.random_firmware import Firmware, difference, started, words_of
 
 IFS0 = DSPIC30F6014A.sfrs["IFS0"].address
 START = 0x200

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import struct
 
-from elf_samples import NOTE, SampleSection, doubled
+from tests.emu.loader.elf_samples import NOTE, SampleSection, doubled
 
 ROWS = ((0x104, 10), (0x106, 12), (0x10A, 0))
 """(address, line) pairs of the sample's line program; the last one ends the sequence."""

@@ -5,11 +5,11 @@ from __future__ import annotations
 import dataclasses
 
 import pytest
-from dwarf_samples import debug_sections
-from elf_samples import doubled, xc16_like
 
 from emu.image.lines import remove_phantom_octets
 from emu.image.loader import parse_image
+from tests.emu.loader.dwarf_samples import debug_sections
+from tests.emu.loader.elf_samples import doubled, xc16_like
 
 
 def image_with(parts):

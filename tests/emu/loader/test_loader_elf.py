@@ -5,10 +5,10 @@ from __future__ import annotations
 import struct
 
 import pytest
-from elf_samples import CODE, DATA_COPY, PSV, ElfSample, Name, SampleSection, words, xc16_like
 
 from emu.image.loader import load_image, parse_image
 from emu.image.model import LoadError
+from tests.emu.loader.elf_samples import CODE, DATA_COPY, PSV, ElfSample, Name, SampleSection, words, xc16_like
 
 
 def parsed(sample: ElfSample):

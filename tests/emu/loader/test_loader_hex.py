@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import pytest
-from elf_samples import words, xc16_like
 
 from emu.image.loader import load_image, parse_image
 from emu.image.model import LoadError
+from tests.emu.loader.elf_samples import words, xc16_like
 
 
 def record(address: int, data: bytes, kind: int = 0) -> str:

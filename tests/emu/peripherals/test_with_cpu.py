@@ -6,9 +6,9 @@ Sections without a file name are those of the chip reference.
 from __future__ import annotations
 
 import pytest
-from cpu_rig import START, Rig
 
 from emu.chips.dspic30f6014a import SFRS, VECTORS
+from tests.emu.cpu.cpu_rig import START, Rig
 
 from .drills.device_programs import CHIPS, difference
 

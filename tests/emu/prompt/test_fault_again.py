@@ -6,12 +6,12 @@ import io
 from pathlib import Path
 
 import pytest
-from programs import executable
 
 import emu
 from emu.dap.server import Server
 from emu.host.exit_status import FAULT
 from emu.prompt.reader import Prompt
+from tests.emu.cli.programs import executable
 
 PROGRAM = """
     mov #0x900, w15

@@ -6,7 +6,6 @@ import io
 from pathlib import Path
 
 import pytest
-from programs import assembled, executable
 
 import emu
 from emu.dap.debuggee import SLICE_CYCLES, Debuggee
@@ -15,6 +14,7 @@ from emu.debug.history import History
 from emu.inject.faults import Fault, inject_fault
 from emu.machine.stops import SLEEP_CYCLES, STILL_ASLEEP
 from emu.prompt.reader import Prompt
+from tests.emu.cli.programs import assembled, executable
 
 PROGRAM = """
     mov #0x900, w15

@@ -7,13 +7,13 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from programs import executable
 
 import emu
 from emu.dap.server import Server
 from emu.debug.history import History
 from emu.host.exit_status import BAD_INPUT
 from emu.prompt.reader import Prompt
+from tests.emu.cli.programs import executable
 
 PROGRAM = """
     mov #0x900, w15

@@ -11,11 +11,11 @@ from pathlib import Path
 
 from emu.dspic30f.isa import codec
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "emu" / "isa"))
+sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
 
 
 def main() -> int:
-    from sleigh import disagreement  # tests/emu/isa/sleigh.py
+    from tests.emu.isa.sleigh import disagreement  # tests/emu/isa/sleigh.py
 
     classes: Counter[str] = Counter()
     example: dict[str, int] = {}

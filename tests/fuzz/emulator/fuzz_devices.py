@@ -12,11 +12,10 @@ from collections import Counter
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[3]
-sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "emu")]
-
-from peripherals.drills.device_programs import CHIPS, difference, program, words_of  # noqa: E402
+sys.path.insert(0, str(ROOT))
 
 from emu.chips.chip import Chip  # noqa: E402
+from tests.emu.peripherals.drills.device_programs import CHIPS, difference, program, words_of  # noqa: E402
 from tests.fuzz.seeds import Campaign, parser  # noqa: E402
 
 

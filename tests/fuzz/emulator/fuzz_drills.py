@@ -15,13 +15,12 @@ from itertools import islice
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[3]
-sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "emu")]
+sys.path.insert(0, str(ROOT))
 
-from peripherals.drills.access_census import WAYS, modes_of  # noqa: E402
-from peripherals.drills.device_drills import registers_of  # noqa: E402
-from peripherals.drills.device_programs import CHIPS  # noqa: E402
-from peripherals.drills.drill_runs import Tally, check  # noqa: E402
-
+from tests.emu.peripherals.drills.access_census import WAYS, modes_of  # noqa: E402
+from tests.emu.peripherals.drills.device_drills import registers_of  # noqa: E402
+from tests.emu.peripherals.drills.device_programs import CHIPS  # noqa: E402
+from tests.emu.peripherals.drills.drill_runs import Tally, check  # noqa: E402
 from tests.fuzz.seeds import Campaign, parser  # noqa: E402
 
 

@@ -10,12 +10,11 @@ import sys
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[3]
-sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "emu" / "cpu"), str(ROOT / "tests" / "emu" / "chips")]
-
-from engine_fuzz import Difference, check_pairs, check_programs  # noqa: E402
-from made_up import CHIPS  # noqa: E402
+sys.path.insert(0, str(ROOT))
 
 from emu.dspic30f.isa.table import ROWS  # noqa: E402
+from tests.emu.chips.made_up import CHIPS  # noqa: E402
+from tests.emu.cpu.engine_fuzz import Difference, check_pairs, check_programs  # noqa: E402
 from tests.fuzz.seeds import Campaign, parser  # noqa: E402
 
 CONTEXTS = 20

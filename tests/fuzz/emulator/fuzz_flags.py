@@ -12,10 +12,9 @@ import sys
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[3]
-sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "emu"), str(ROOT / "tests" / "emu" / "jit")]
+sys.path.insert(0, str(ROOT))
 
-from flag_drills import Tally, all_pairs, check  # noqa: E402
-
+from tests.emu.jit.comparison.flag_drills import Tally, all_pairs, check  # noqa: E402
 from tests.fuzz.seeds import Campaign, parser  # noqa: E402
 
 

@@ -28,7 +28,7 @@ from pathlib import Path
 from typing import Any
 
 ROOT = Path(__file__).resolve().parents[3]
-sys.path[:0] = [str(ROOT)]
+sys.path.insert(0, str(ROOT))
 
 import pyarrow  # noqa: E402
 from PIL import Image  # noqa: E402

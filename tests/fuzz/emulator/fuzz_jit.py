@@ -33,13 +33,12 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
 ROOT = Path(__file__).resolve().parents[3]
-sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "emu" / "jit"), str(ROOT / "tests" / "emu" / "chips")]
-
-from engine_pair import Difference, Tally, check_straight, check_wild  # noqa: E402
-from long_runs import check_long  # noqa: E402
-from made_up import MADE_UP  # noqa: E402
+sys.path.insert(0, str(ROOT))
 
 from emu.chips.dspic30f6014a import DSPIC30F6014A  # noqa: E402
+from tests.emu.chips.made_up import MADE_UP  # noqa: E402
+from tests.emu.jit.comparison.engine_pair import Difference, Tally, check_straight, check_wild  # noqa: E402
+from tests.emu.jit.comparison.long_runs import check_long  # noqa: E402
 from tests.fuzz.seeds import base_seed  # noqa: E402
 
 SAVE_EVERY = 60.0

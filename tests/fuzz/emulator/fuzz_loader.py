@@ -14,16 +14,15 @@ from collections.abc import Iterable
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[3]
-sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "emu" / "loader")]
-
-from dwarf_samples import debug_sections  # noqa: E402
-from elf_samples import words, xc16_like  # noqa: E402
+sys.path.insert(0, str(ROOT))
 
 from emu.commands.info import describe  # noqa: E402
 from emu.image.footprint import pieces  # noqa: E402
 from emu.image.loader import parse_image  # noqa: E402
 from emu.image.model import LoadError  # noqa: E402
 from emu.instruments.disassembly import items  # noqa: E402
+from tests.emu.loader.dwarf_samples import debug_sections  # noqa: E402
+from tests.emu.loader.elf_samples import words, xc16_like  # noqa: E402
 from tests.fuzz.seeds import Campaign, parser  # noqa: E402
 
 INTERESTING = (0, 1, 2, 3, 4, 7, 8, 0x7F, 0x80, 0xFF, 0x100, 0x7FFF, 0x8000, 0xFFFF, 0x17FFE, 0x18000, 0x7FF000)

@@ -11,11 +11,10 @@ from collections import Counter
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[3]
-sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "emu" / "jit")]
+sys.path.insert(0, str(ROOT))
 
-from engine_pair import Difference  # noqa: E402
-from observed_runs import check_observed  # noqa: E402
-
+from tests.emu.jit.comparison.engine_pair import Difference  # noqa: E402
+from tests.emu.jit.comparison.observed_runs import check_observed  # noqa: E402
 from tests.fuzz.seeds import Campaign, parser  # noqa: E402
 
 

@@ -15,12 +15,11 @@ import traceback
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[3]
-sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "emu")]
+sys.path.insert(0, str(ROOT))
 
-from peripherals.conftest import Rig  # noqa: E402
-from peripherals.plain_adc import difference  # noqa: E402
-from peripherals.test_fuzz import WORDS, act, contradictions  # noqa: E402
-
+from tests.emu.peripherals.conftest import Rig  # noqa: E402
+from tests.emu.peripherals.plain_adc import difference  # noqa: E402
+from tests.emu.peripherals.test_fuzz import WORDS, act, contradictions  # noqa: E402
 from tests.fuzz.seeds import Campaign, parser  # noqa: E402
 
 ACTIONS = 8000

@@ -15,14 +15,13 @@ from collections.abc import Iterable
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[3]
-sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "emu" / "loader"), str(ROOT / "tests" / "emu" / "cli")]
-
-from elf_samples import ElfSample, SampleSection, words  # noqa: E402
-from programs import ECHO, HELLO, SPIN, assembled  # noqa: E402
+sys.path.insert(0, str(ROOT))
 
 from emu.api import Machine  # noqa: E402
 from emu.image.loader import parse_image  # noqa: E402
 from emu.machine.stops import REASONS  # noqa: E402
+from tests.emu.cli.programs import ECHO, HELLO, SPIN, assembled  # noqa: E402
+from tests.emu.loader.elf_samples import ElfSample, SampleSection, words  # noqa: E402
 from tests.fuzz.seeds import Campaign, parser  # noqa: E402
 
 CYCLES = 3_000

@@ -9,20 +9,15 @@ start of a run, so the same native code accesses many registers. Seed and chip d
 from __future__ import annotations
 
 import random
-import sys
 from dataclasses import dataclass, field
 from functools import cache, partial
-from pathlib import Path
 from typing import Any, Final
-
-sys.path.insert(0, str(Path(__file__).parents[2] / "jit"))
-
-from random_firmware import words_of
 
 from emu.chips.chip import Chip
 from emu.dspic30f.isa import codec, table
 from emu.dspic30f.isa.fields import Operands
 from emu.dspic30f.isa.row import Row
+from tests.emu.jit.comparison.random_firmware import words_of
 
 from .device_programs import CHIPS, family
 from .device_scenes import SCENES, Scene

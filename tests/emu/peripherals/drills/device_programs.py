@@ -10,22 +10,13 @@ everything.
 from __future__ import annotations
 
 import random
-import sys
 from collections import Counter
 from dataclasses import dataclass, field
 from functools import cache, partial
 from itertools import takewhile
-from pathlib import Path
 from typing import Any
 
-sys.path.insert(0, str(Path(__file__).parents[2] / "cpu"))
-sys.path.insert(0, str(Path(__file__).parents[2] / "jit"))
-sys.path.insert(0, str(Path(__file__).parents[2] / "chips"))
-
 import numpy as np
-from cpu_rig import START, assemble
-from engine_pair import QuickCompiler
-from made_up import CHIPS
 
 from emu.boards.epuck.board import Epuck
 from emu.chips.chip import Chip
@@ -35,6 +26,9 @@ from emu.machine.machine import Machine
 from emu.machine.stops import Stop
 from emu.peripherals.i2c.bus import I2cDevice
 from emu.peripherals.i2c.slave import ExternalMaster
+from tests.emu.chips.made_up import CHIPS
+from tests.emu.cpu.cpu_rig import START, assemble
+from tests.emu.jit.comparison.engine_pair import QuickCompiler
 
 from .device_scenes import SCENES
 

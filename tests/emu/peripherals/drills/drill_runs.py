@@ -9,18 +9,11 @@ random cycles. Finally records, stops and sent bytes are compared.
 from __future__ import annotations
 
 import random
-import sys
 from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from functools import cache, partial
-from pathlib import Path
 from typing import Final
-
-sys.path.insert(0, str(Path(__file__).parents[2] / "jit"))
-
-from engine_pair import QuickCompiler
-from random_firmware import words_of
 
 from emu.boards.epuck.board import Epuck
 from emu.chips.chip import Chip
@@ -31,6 +24,8 @@ from emu.dspic30f.jit.engine import JitEngine
 from emu.dspic30f.state.state import PSV
 from emu.machine.machine import Machine
 from emu.machine.stops import Stop
+from tests.emu.jit.comparison.engine_pair import QuickCompiler
+from tests.emu.jit.comparison.random_firmware import words_of
 
 from .access_census import Census
 from .device_drills import CONTROL, DRILLS, MODES, Image, image_of, registers_of

@@ -6,9 +6,9 @@ import random
 from itertools import pairwise
 
 import pytest
-from cpu_rig import Rig
 
 from emu.chips.dspic30f6014a import SFRS
+from tests.emu.cpu.cpu_rig import Rig
 
 A = {name: f"{sfr.address:#x}" for name, sfr in SFRS.items()}
 UART = """

@@ -11,17 +11,16 @@ import ctypes
 import random
 from typing import Any, Final
 
-from engine_pair import NO_WATCHDOG, Difference, QuickCompiler, Tally, advance
-from random_firmware import difference, load
-from straight_body import Shape
-from straight_firmware import straight_firmware
-
 from emu.dspic30f.jit.engine import JitEngine
 from emu.dspic30f.jit.environment import ENV_WORDS
 from emu.dspic30f.jit.ir.values import Number
 from emu.dspic30f.jit.translate import function
 from emu.dspic30f.jit.translate.function import Translator
 from emu.machine.machine import Machine
+from tests.emu.jit.comparison.engine_pair import NO_WATCHDOG, Difference, QuickCompiler, Tally, advance
+from tests.emu.jit.comparison.random_firmware import difference, load
+from tests.emu.jit.comparison.straight_body import Shape
+from tests.emu.jit.comparison.straight_firmware import straight_firmware
 
 EXECUTED: Final = ENV_WORDS - 1
 """Index of the word in the native environment in which native code counts instructions."""

@@ -10,8 +10,21 @@ from __future__ import annotations
 
 import random
 
-from random_firmware import BY_SYNTAX, CODE, HANDLER, ISR, TRAP_COUNT, Firmware, literal, to_sfr, words_of
-from straight_body import (
+from emu.chips.dspic30f6014a import DSPIC30F6014A
+from emu.dspic30f.isa import codec
+from emu.dspic30f.isa.fields import Operands
+from tests.emu.jit.comparison.random_firmware import (
+    BY_SYNTAX,
+    CODE,
+    HANDLER,
+    ISR,
+    TRAP_COUNT,
+    Firmware,
+    literal,
+    to_sfr,
+    words_of,
+)
+from tests.emu.jit.comparison.straight_body import (
     BODY,
     LEAF_COUNT,
     LEAF_WORDS,
@@ -21,10 +34,6 @@ from straight_body import (
     BodyWriter,
     Shape,
 )
-
-from emu.chips.dspic30f6014a import DSPIC30F6014A
-from emu.dspic30f.isa import codec
-from emu.dspic30f.isa.fields import Operands
 
 STACK_TRAP, MATH_TRAP = HANDLER + 0x40, HANDLER + 0x60
 TRAP_HANDLERS = {"StackError": STACK_TRAP, "MathError": MATH_TRAP}

@@ -17,16 +17,15 @@ from dataclasses import dataclass, field
 from functools import cache
 from typing import Any, Final
 
-from engine_pair import QuickCompiler
-from random_firmware import difference, words_of
-from rowmachine import SR, RowMachine
-
 from emu.dspic30f.isa import codec
 from emu.dspic30f.isa.fields import Operands
 from emu.dspic30f.isa.row import Insn, Row
 from emu.dspic30f.isa.table import ROWS
 from emu.dspic30f.jit.engine import JitEngine
 from emu.machine.machine import Machine
+from tests.emu.jit.comparison.engine_pair import QuickCompiler
+from tests.emu.jit.comparison.random_firmware import difference, words_of
+from tests.emu.rowmachine import SR, RowMachine
 
 ENGINES: Final = ("plain", "jit")
 FLAGS: Final = ("C", "Z", "OV", "N", "DC")

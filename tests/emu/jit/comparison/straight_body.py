@@ -10,7 +10,12 @@ from __future__ import annotations
 import random
 from dataclasses import dataclass
 
-from random_firmware import (
+from emu.chips.dspic30f6014a import DSPIC30F6014A
+from emu.dspic30f.isa import codec, table
+from emu.dspic30f.isa.facts import facts_of
+from emu.dspic30f.isa.fields import Operands
+from emu.dspic30f.isa.row import Row
+from tests.emu.jit.comparison.random_firmware import (
     FLOWS,
     STACK,
     TRAP_COUNT,
@@ -21,12 +26,6 @@ from random_firmware import (
     to_sfr,
     words_of,
 )
-
-from emu.chips.dspic30f6014a import DSPIC30F6014A
-from emu.dspic30f.isa import codec, table
-from emu.dspic30f.isa.facts import facts_of
-from emu.dspic30f.isa.fields import Operands
-from emu.dspic30f.isa.row import Row
 
 BODY, BODY_END = 0x2000, 0xE000
 LEAVES, LEAF_WORDS, LEAF_COUNT = 0x1200, 8, 16

@@ -15,10 +15,6 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
-from random_firmware import BODY_WORDS, CODE, Firmware, difference, load, random_firmware
-from straight_body import BODY, Shape
-from straight_firmware import straight_firmware
-
 from emu.chips.chip import Chip
 from emu.chips.dspic30f6014a import DSPIC30F6014A
 from emu.dspic30f.exceptions.faults import DebuggerWord, IllegalOpcode
@@ -28,6 +24,9 @@ from emu.dspic30f.jit.engine import JitEngine
 from emu.dspic30f.jit.worker import Backend
 from emu.dspic30f.state.state import DA, NOT_REPEATING, RA
 from emu.machine.machine import Machine
+from tests.emu.jit.comparison.random_firmware import BODY_WORDS, CODE, Firmware, difference, load, random_firmware
+from tests.emu.jit.comparison.straight_body import BODY, Shape
+from tests.emu.jit.comparison.straight_firmware import straight_firmware
 
 MODE_BITS = 0x10F7
 """CORCON bits that select processor modes (isa.md §2.4)."""

@@ -15,9 +15,6 @@ from functools import cache
 from pathlib import Path
 from typing import Final
 
-from engine_pair import NO_WATCHDOG, Difference, QuickCompiler
-from random_firmware import BODY_WORDS, CODE, load, random_firmware
-
 from emu.chips.chip import Chip
 from emu.chips.dspic30f6014a import DSPIC30F6014A
 from emu.dspic30f.change_log import Watched, WatchedNumber
@@ -33,6 +30,8 @@ from emu.instruments.vcd import WaveformRecorder
 from emu.machine.machine import Machine
 from emu.machine.stops import Stop
 from emu.system.filters import OPERATORS, Comparison
+from tests.emu.jit.comparison.engine_pair import NO_WATCHDOG, Difference, QuickCompiler
+from tests.emu.jit.comparison.random_firmware import BODY_WORDS, CODE, load, random_firmware
 
 CYCLES: Final = 3_000
 PEEKED: Final = ("TMR1", "TMR2", "PORTD", "U1STA", "IFS0", "ADCON1", "SR", "RCOUNT")
