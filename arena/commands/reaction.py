@@ -85,7 +85,7 @@ def reaction(image: Path, word: str, selector: int, frames: int, seed: int) -> d
     machine = emu.load(image, board=partial(Epuck, camera="PO6030K", selector=selector, seed=seed))
     machine.board.remote.press("ok", cycle=OK_AT_TCY)
     show = AlternatingPicture(seed)
-    machine.board.camera.sample(show.pixels)
+    machine.board.camera.show_pixels(show.pixels)
     try:
         machine.peek(word)
     except (KeyError, ValueError) as error:

@@ -28,7 +28,7 @@ class InputLog:
         self._lines: Final[dict[int, NDArray[np.uint8]]] = {}
         self._levels: Final = _SensorLevels()
         camera, sources = machine.board.camera, machine.board.chip.adc.source
-        camera.sample(partial(self._pixels, camera.sampled))
+        camera.show_pixels(partial(self._pixels, camera.pixel_source))
         for channel in SENSORS:
             sources[channel] = partial(self._level, channel, sources[channel])
 

@@ -114,7 +114,7 @@ class FirmwareController:
         assert self._board.camera is not None
         self._board.camera.lamp = scene.light.brightness
         self._sees_leds: Final = scene.camera.sees_leds
-        self._board.camera.sample(self._pixels, has_native_source=not self._sees_leds)
+        self._board.camera.show_pixels(self._pixels, has_native_source=not self._sees_leds)
         self._schedule_inputs(scene)
         self.machine.uart[1].listen(self._on_uart_byte, lazy=True)
         self._channel: Final = channel or OpticalChannel.of(scene)
@@ -192,7 +192,7 @@ class FirmwareController:
     def use_native_runner(self, run_native: NativeRunner) -> None:
         """Run native code by `run_native` from now on, if the machine has native code."""
         self._native_runner = run_native
-        self.native.attach(self.machine.lend(self._run_native))
+        self.native.attach(self.machine.attach_runner(self._run_native))
 
     def _run_native(self, call: Call, record: int, env: int) -> int:
         """Run native code by the scheduler, with the fields it needs up to date; return the exit reason.

@@ -95,7 +95,7 @@ class ChangeLog:
         self.leaves: Final = leaves
         self.every_write: Final = every_write
         self._stores: Final[list[tuple[int, int]]] = []
-        """Address and size of the stores that the sequencer has made since the last look."""
+        """Address and size of the stores that the sequencer has made since the last check."""
         self._consumer: Final = consumer
         self.first: Final = SEEN + len(self.watched)
         """Word of the first entry."""

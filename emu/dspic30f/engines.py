@@ -45,7 +45,7 @@ class Engine(Protocol):
     def passed(self) -> list[int]:
         """Return, for each limit passed since the last call, the first boundary (Tcy) at or after it."""
 
-    def lend(self, run: Run) -> Native | None:
+    def attach_runner(self, run: Run) -> Native | None:
         """Make `natively` call `run` instead of native code, except while cycles or host time are measured.
 
         Return the addresses that `run` needs, None for an engine without native code.
@@ -78,7 +78,7 @@ class PlainEngine:
         """Return an empty list, because this engine passes no limits."""
         return []
 
-    def lend(self, run: Run) -> None:
+    def attach_runner(self, run: Run) -> None:
         """Return None, because this engine has no native code."""
 
 

@@ -258,13 +258,13 @@ class Machine(StateAccess):
             if now >= self._last:
                 return None
 
-    def lend(self, run: Run) -> Native | None:
+    def attach_runner(self, run: Run) -> Native | None:
         """Return the handle by which another native program runs this machine (emu/system/native_handle.py).
 
         From now on `run` executes the native code. It may extend a `run_past` by moving `Native.last`. Returns None for
         an engine without native code.
         """
-        return self.runner.lend(run)
+        return self.runner.attach_runner(run)
 
     def end_at_cut(self) -> None:
         """Make the current `run_past` end at its next cut at the latest."""

@@ -164,7 +164,7 @@ class Bus:
         else:
             self.on_read[word], self.on_write[word], self.rules[word] = wiring.on_read, wiring.on_write, wiring.rule
 
-    def lacks(self, what: str) -> None:
+    def report_unmodelled(self, what: str) -> None:
         """Report once that firmware uses `what`, which is not modelled: register, field and the behaviour instead."""
         if what not in self._noted and not self.events.quiet:
             self._noted.add(what)

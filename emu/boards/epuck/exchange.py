@@ -6,7 +6,7 @@
     robot.inputs.distance[:] = ...
     robot.inputs.apply()            # holds from the current cycle on
 
-The camera calls its pixel source when a line is read out (`Camera.sample`). The remote control is `Remote.press`.
+The camera calls its pixel source when a line is read out (`Camera.show_pixels`). The remote control is `Remote.press`.
 """
 
 from __future__ import annotations

@@ -295,8 +295,8 @@ class JitEngine:
         self._env[PASSED_COUNT] = 0
         return list(self._env[PASSED : PASSED + count])
 
-    def lend(self, run: Run) -> Native:
-        """Implement `Engine.lend`."""
+    def attach_runner(self, run: Run) -> Native:
+        """Implement `Engine.attach_runner`."""
         core, env, record = self._core, self._env_address, self._core.record
         at = {name: record.address + record.fields[field].offset for name, field in NATIVE_FIELDS.items()}
         at |= {name: record.address + core.chip.sfrs[sfr].address for name, sfr in NATIVE_SFRS.items()}

@@ -66,7 +66,7 @@ class Can(Peripheral):
 
     def _ctrl_written(self, old: int, new: int, _lanes: int) -> None:
         if self.ctrl["CANCAP"]:
-            self.bus.lacks(f"{self.ctrl.name}.CANCAP: capture of received frames by a timer")
+            self.bus.report_unmodelled(f"{self.ctrl.name}.CANCAP: capture of received frames by a timer")
         if self.ctrl["ABAT"]:
             self._abort_all()
         if self.ctrl["REQOP"] != self.ctrl["OPMODE"] and self.events.due(self._mode) == NEVER:
@@ -207,7 +207,7 @@ class Can(Peripheral):
 
     def _enables_written(self) -> None:
         if self.inte["WAKIE"]:
-            self.bus.lacks(f"{self.inte.name}.WAKIE: wake-up by activity on the bus")
+            self.bus.report_unmodelled(f"{self.inte.name}.WAKIE: wake-up by activity on the bus")
         self._signal(self.intf.value & 0xFF)
 
     def _raise(self, flag: str) -> None:

@@ -154,7 +154,7 @@ class Qei(Peripheral):
     def _con_written(self, old: int, new: int, _lanes: int) -> None:
         mode = self.con["QEIM"]
         if mode == _TIMER and (self.con["TQCS"] or self.con["TQGATE"]):
-            self.bus.lacks("QEICON.TQCS and TQGATE: the timer counts Tcy only")
+            self.bus.report_unmodelled("QEICON.TQCS and TQGATE: the timer counts Tcy only")
         if mode & _ENCODER:  # UPDN is a status bit in the encoder modes (§14.1)
             updn = 1 << self.context.chip.sfrs["QEICON"].fields["UPDN"][0]
             self.con.value = new & ~updn | old & updn

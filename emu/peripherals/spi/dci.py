@@ -158,9 +158,9 @@ class Dci(Peripheral):
     def _con1_written(self, old: int, new: int, _lanes: int) -> None:
         enable = 1 << self.context.chip.sfrs["DCICON1"].fields["DCIEN"][0]
         if new & enable and self.con1["CSCKD"]:
-            self.bus.lacks("DCICON1.CSCKD: no external clock exists, the codec port transfers nothing")
+            self.bus.report_unmodelled("DCICON1.CSCKD: no external clock exists, the codec port transfers nothing")
         if new & enable and self.con1["COFSM"] & 2:
-            self.bus.lacks("DCICON1.COFSM: AC-Link frames are sent as multichannel frames")
+            self.bus.report_unmodelled("DCICON1.COFSM: AC-Link frames are sent as multichannel frames")
         if new & ~old & enable:
             self._start()
         elif old & ~new & enable:

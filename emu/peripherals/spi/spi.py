@@ -217,7 +217,7 @@ class Spi(Peripheral):
 
     def _con_written(self, _old: int, _new: int, _lanes: int) -> None:
         if self.con["FRMEN"]:
-            self.bus.lacks(f"{self.con.name}.FRMEN: frame sync pulses")
+            self.bus.report_unmodelled(f"{self.con.name}.FRMEN: frame sync pulses")
         self._take_pins()
 
     def _stat_written(self, old: int, new: int, _lanes: int) -> None:

@@ -148,7 +148,9 @@ class Oscillator(Peripheral):
         flags = self._flags & lanes
         self.con.value = (old & ~free | new & free) & (new | ~flags)
         if self.con["LPOSCEN"]:
-            self.bus.lacks("OSCCON.LPOSCEN: no 32 kHz crystal is fitted; timer 1 counts edges driven on its pin")
+            self.bus.report_unmodelled(
+                "OSCCON.LPOSCEN: no 32 kHz crystal is fitted; timer 1 counts edges driven on its pin"
+            )
         if self.con["OSWEN"] and not old & 1:
             self._request_switch()
         elif not self.con["OSWEN"]:

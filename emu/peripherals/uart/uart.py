@@ -412,7 +412,7 @@ class Uart(Peripheral):
             else:
                 self._abort()
         if "ALTIO" in self.context.chip.sfrs[self.mode.name].fields and self.mode["ALTIO"]:
-            self.bus.lacks(f"{self.mode.name}.ALTIO: the UART keeps its standard pins")  # UNVERIFIED (§10)
+            self.bus.report_unmodelled(f"{self.mode.name}.ALTIO: the UART keeps its standard pins")  # UNVERIFIED (§10)
         self.restored()
         self._plan_line()
 

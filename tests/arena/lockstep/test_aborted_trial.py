@@ -37,7 +37,7 @@ def interrupt(robot: FirmwareController) -> None:
             raise KeyboardInterrupt
         return paint(*line)
 
-    camera.sample(pixels)
+    camera.show_pixels(pixels)
 
 
 @pytest.mark.slow
@@ -72,7 +72,7 @@ def test_an_interrupted_machine_keeps_no_limits(assembled: Callable[[str], Path]
     with pytest.raises(KeyboardInterrupt):
         LockStep(World(scene, 1), [robot]).advance(300)
     machine = robot.machine
-    machine.board.camera.sample(None)
+    machine.board.camera.show_pixels(None)
     before = machine.cycle
     assert before < machine.cycles_in(0.3)
     assert machine.run(cycles=1000).reason == "limit"

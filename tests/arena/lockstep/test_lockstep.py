@@ -116,7 +116,7 @@ def samples(
             painted += 1
             return paint(*line)
 
-        camera.sample(counted, has_native_source=True)
+        camera.show_pixels(counted, has_native_source=True)
     world = World(scene, 5)
     lockstep = LockStep(world, robots, is_native=is_native, threads=threads)
     for moment in range(500, round(seconds * 1000) + 1, 500):

@@ -87,7 +87,7 @@ def test_the_scripted_sensor_has_first_frame_and_latency_of_the_firmware(cluster
         rows.setdefault(y, cycle)
         return pixels(y, columns, cycle)  # type: ignore[arg-type]
 
-    camera.sample(watched)
+    camera.show_pixels(watched)
     tick = 0
     while not firmware.machine.peek("stepper_left"):
         firmware.control_step(tick, world.poses)
@@ -223,7 +223,7 @@ def test_reaction_finds_the_latency_and_no_missed_frame(clustering_image: Path) 
     show = AlternatingPicture(1)
     machine = emu.load(clustering_image, board=partial(Epuck, camera="PO6030K", selector=0, seed=1))
     machine.board.remote.press("ok", cycle=OK_AT_TCY)
-    machine.board.camera.sample(show.pixels)
+    machine.board.camera.show_pixels(show.pixels)
     machine.run_until(2 * OK_AT_TCY)
     waits, before = [], machine.peek("stepper_left")
     while len(waits) < 5:

@@ -44,7 +44,7 @@ def machine(engine: str, program: str, lines: list[int]) -> Machine:
             made.program.put(at, word)
             at += 2
     made.pc = LOOP
-    made.board.camera.sample(row)
+    made.board.camera.show_pixels(row)
     return made
 
 

@@ -8,6 +8,7 @@ ends. Generated code of the port reads the pixels from the record.
 from __future__ import annotations
 
 import ctypes
+import warnings
 from collections.abc import Callable, Iterable
 from functools import partial
 from typing import TYPE_CHECKING, Final
@@ -65,7 +66,7 @@ class Camera(BoardPart, I2cDevice):
         places = (cell_of(self.record, f"camera.{name}") for name in ("line_from", "line_to", "line", "line_byte_tcy"))
         chip.ports[DATA_PORT].attach_byte_stream(ByteStream(DATA_MASK, 8, *places), self._refresh)
         self.native: Final = NativeCamera.of(self.record)
-        """State for native code that renders the scene set by `sample`."""
+        """State for native code that renders the scene of `show_pixels`."""
         self._native_address: Final = ctypes.addressof(self.native)
         self._has_native_source, self._settings = False, 0
         self._pixels: PixelSource | None = None
@@ -94,14 +95,14 @@ class Camera(BoardPart, I2cDevice):
         from emu.boards.epuck.camera.pixels import StillImage, as_vga
 
         still = StillImage(as_vga(image, turned))
-        self.sample(still, has_native_source=True)
+        self.show_pixels(still, has_native_source=True)
         self._still = still
 
-    def look(self, rows: RowSource) -> None:
+    def show_rows(self, rows: RowSource) -> None:
         """Set a scene that is computed row by row. The camera calls `rows(y, cycle)` when it reads out a line."""
-        self.sample(lambda y, columns, cycle: rows(y, cycle)[columns])
+        self.show_pixels(lambda y, columns, cycle: rows(y, cycle)[columns])
 
-    def sample(self, pixels: PixelSource, has_native_source: bool = False) -> None:
+    def show_pixels(self, pixels: PixelSource, has_native_source: bool = False) -> None:
         """Set a scene that is computed pixel by pixel.
 
         The camera calls `pixels(y, columns, cycle)` once for each line that the firmware reads; `cycle` is the rising
@@ -112,8 +113,13 @@ class Camera(BoardPart, I2cDevice):
         self.native.setting = 0
         self._line_to.value = 0
 
+    def sample(self, pixels: PixelSource, has_native_source: bool = False) -> None:
+        """Old spelling of `show_pixels`, which this release still accepts."""
+        warnings.warn("Camera.sample is called show_pixels now", DeprecationWarning, stacklevel=2)
+        self.show_pixels(pixels, has_native_source)
+
     @property
-    def sampled(self) -> PixelSource | None:
+    def pixel_source(self) -> PixelSource | None:
         """The current pixel source."""
         return self._pixels
 

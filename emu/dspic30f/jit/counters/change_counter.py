@@ -29,7 +29,7 @@ class ChangeCounter(CycleCounter):
     def __init__(self, log: ChangeLog, ram: tuple[int, int]) -> None:
         self._log: Final = log
         self._ram: Final = ram
-        self.looks_asleep = "asleep" in log.watched
+        self.checks_asleep = "asleep" in log.watched
         self._hits: Number = 0
         """Bit n is set if the instruction has stored to watched number n; used if unchanged values are logged too."""
 
@@ -44,18 +44,18 @@ class ChangeCounter(CycleCounter):
         changed: Number = 0
         for index, one in enumerate(self._log.watched):
             changed = (self._number(head, one) != _word(head, "%x.log", SEEN + index)) | changed
-        look, leave, on = (head.fresh(name) for name in ("look", "leave", "on"))
+        check, leave, on = (head.fresh(name) for name in ("check", "leave", "on"))
         cycle = head.load(pointer(head, self._offset["cpu.cycle"]), 64)
         here = head.load(pointer(head, self._offset["cpu.pc"]), 32)
-        head.end(f"br i1 {truth(changed)}, label %{look}, label %{on}")
-        head.start(look)
+        head.end(f"br i1 {truth(changed)}, label %{check}, label %{on}")
+        head.start(check)
         leaves = _look(head, cycle, here | BOUNDARY << 32, 0)
         head.end(f"br i1 {leaves}, label %{leave}, label %{on}")
         head.start(leave)
         head.end(f"ret i64 {CHANGED}")
         head.start(on)
 
-    def looks_after(self, effects: DeferredEffects) -> Number:
+    def needs_check_after(self, effects: DeferredEffects) -> Number:
         """Return whether an instruction with these effects may have changed a watched number."""
         found: Number = int(effects.sr is not None and "ipl" in self._log.watched)
         self._hits = 0
@@ -67,7 +67,7 @@ class ChangeCounter(CycleCounter):
                     self._hits = (hit << index) | self._hits if self._log.every_write else 0
         return found
 
-    def look(self, site: int, cycle: Number, next_pc: Number) -> str:
+    def check_changes(self, site: int, cycle: Number, next_pc: Number) -> str:
         """Emit the comparison of all watched numbers after the instruction at `site`.
 
         Return the truth, as IR operand, that native code must return to Python.
@@ -101,7 +101,7 @@ class ChangeCounter(CycleCounter):
             leaves = holds | leaves
         e.end(f"ret i1 {truth(leaves)}")
         parameters = "ptr noalias %rec, ptr noalias %log, i64 %cycle, i64 %where, i64 %hits"
-        return f"define internal i1 @look({parameters}) noinline {{\n{e.text()}\n}}\n"
+        return f"define internal i1 @check_changes({parameters}) noinline {{\n{e.text()}\n}}\n"
 
     def _number(self, e: Emitter, one: Watched) -> Value:
         """Emit a read of a watched number from the record."""
@@ -130,14 +130,14 @@ class ChangeCounter(CycleCounter):
 
 
 class ChangeBoundaryCounter(BoundaryCounter):
-    """Counter of native boundaries with a log of changes. After a RETFIE, Python looks before the boundary."""
+    """Counter of native boundaries with a log of changes. After a RETFIE, Python checks before the boundary."""
 
     returns_after_retfie = True
 
 
 def _look(e: Emitter, cycle: Number, where: Number, hits: Number) -> str:
     numbers = ", ".join(f"i64 {wide(one)}" for one in (cycle, where, hits))
-    return e.let(f"call i1 @look(ptr %rec, ptr %x.log, {numbers})", bit=True).text
+    return e.let(f"call i1 @check_changes(ptr %rec, ptr %x.log, {numbers})", bit=True).text
 
 
 def _place(e: Emitter, log: str, word: Number) -> str:

@@ -36,8 +36,8 @@ class CycleCounter:
     """Cycles that an exit would have to add. Exits that add different cycles need different blocks."""
     splits_repeats = False
     """Whether block code leaves a REPEAT with stores to exact code, which ends every iteration by itself."""
-    looks_asleep = False
-    """Whether `look` is needed after the start of Idle."""
+    checks_asleep = False
+    """Whether `check_changes` is needed after the start of Idle."""
 
     def begin(self, emitter: Emitter, offset: Mapping[str, int]) -> None:
         """Prepare for the function that `emitter` writes."""
@@ -75,12 +75,12 @@ class CycleCounter:
     def begin_instruction(self, pc: int) -> None:
         """Log, in exact code, that the instruction at `pc` starts."""
 
-    def looks_after(self, effects: DeferredEffects) -> Number:
-        """Return whether `look` is needed after an instruction with these effects."""
+    def needs_check_after(self, effects: DeferredEffects) -> Number:
+        """Return whether `check_changes` is needed after an instruction with these effects."""
         return 0
 
-    def look(self, site: int, cycle: Number, next_pc: Number) -> str:
-        """Emit a look at the state after the instruction at `site`. Return whether native code must then return."""
+    def check_changes(self, site: int, cycle: Number, next_pc: Number) -> str:
+        """Emit the comparison of the state after the instruction at `site`. Return whether native code must return."""
         return "false"
 
     def definitions(self) -> str:

@@ -75,18 +75,18 @@ class FunctionFrame:
         begun = self.v.get("cycle") if start is None else start
         return self.e.let(f"icmp ult i64 {wide(begun + cost)}, %stop", bit=True)
 
-    def look(self, site: int, next_pc: Number, condition: Number) -> None:
-        """Where `condition` holds, let the counter look at the state after the instruction at `site`.
+    def check_changes(self, site: int, next_pc: Number, condition: Number) -> None:
+        """Where `condition` holds, let the counter compare the state after the instruction at `site`.
 
         It may make native code return before the instruction at `next_pc`.
         """
         if isinstance(condition, int) and not condition:
             return
         e, cycle = self.e, self.v.get("cycle")
-        look, leave, on = (e.fresh(name) for name in ("look", "leave", "on"))
-        e.end(f"br i1 {truth(condition)}, label %{look}, label %{on}")
-        e.start(look)
-        leaves = self.counter.look(site, cycle, next_pc)
+        check, leave, on = (e.fresh(name) for name in ("check", "leave", "on"))
+        e.end(f"br i1 {truth(condition)}, label %{check}, label %{on}")
+        e.start(check)
+        leaves = self.counter.check_changes(site, cycle, next_pc)
         e.end(f"br i1 {leaves}, label %{leave}, label %{on}")
         e.start(leave)
         if self.b.deferred.check_interrupts:

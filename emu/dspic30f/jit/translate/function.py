@@ -325,7 +325,7 @@ class Translator(FunctionFrame):
         if step.pc == self.layout.do_end:
             self._end_of_loop(step)
             return True
-        self.look(step.pc, step.next_pc, self.counter.looks_after(deferred))
+        self.check_changes(step.pc, step.next_pc, self.counter.needs_check_after(deferred))
         if deferred.deadline_moved or deferred.check_interrupts:
             self._continue_after_effects(step.next_pc)
         else:
@@ -357,11 +357,11 @@ class Translator(FunctionFrame):
 
         The sequencer handles EDT. At the end of the loop, native code leaves the function.
         """
-        flow, looks = self.layout.flow, self.counter.looks_after(self.b.deferred)
+        flow, check = self.layout.flow, self.counter.needs_check_after(self.b.deferred)
         self.counter.settle()
 
         def end(again: bool) -> None:
-            self.look(step.pc, self.layout.do_start if again else step.next_pc, looks)
+            self.check_changes(step.pc, self.layout.do_start if again else step.next_pc, check)
             if again:
                 self._continue_after_effects(self.layout.do_start)
                 return
@@ -434,7 +434,7 @@ class Translator(FunctionFrame):
                 self._go_to(step, target)
             case Call(target):
                 self.counter.called(step.pc, target, self.v.get("W15") - 4, self.v.get("cycle"))
-                self.look(step.pc, target & PC_MASK, self.counter.looks_after(self.b.deferred))
+                self.check_changes(step.pc, target & PC_MASK, self.counter.needs_check_after(self.b.deferred))
                 self._go_to(step, target)
             case Return():
                 self._return(step, flow)
@@ -496,8 +496,8 @@ class Translator(FunctionFrame):
         e.store(pointer(e, offset["cpu.mode"]), IDLE, 16)
         e.store(pointer(e, offset["cpu.slept"]), self.v.get("cycle") - 1, 64)
         e.store(pointer(e, offset["events.deadline"]), 0, 64)
-        looks = self.counter.looks_after(self.b.deferred) | int(self.counter.looks_asleep)
-        self.look(self.at, next_pc, looks)
+        check = self.counter.needs_check_after(self.b.deferred) | int(self.counter.checks_asleep)
+        self.check_changes(self.at, next_pc, check)
         e.end(f"br label %{self.exit(next_pc, BOUNDARY_WORK)}")
 
     # -- interrupts -------------------------------------------------------------------------------------------------

@@ -178,10 +178,10 @@ class RepeatTranslator:
         b.repeating = None
         f.advance(target.insn.row.cycles + stall, target.facts.writes | b.deferred.mapped_w)
         f.counter.settle()
-        counting, looks = paths.get(flow.sr) & RA, f.counter.looks_after(b.deferred)
+        counting, check = paths.get(flow.sr) & RA, f.counter.needs_check_after(b.deferred)
 
         def end(again: bool) -> None:
-            f.look(target.pc, target.pc if again else target.next_pc, looks)
+            f.check_changes(target.pc, target.pc if again else target.next_pc, check)
             if again:
                 e.end(f"br label %{label}")
             else:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import random
+from typing import Any
 
 import numpy as np
 import pytest
@@ -309,7 +310,7 @@ def test_lines_of_a_moving_scene_are_seen_when_they_are_read_out(robot):
         seen.append((y, cycle))
         return np.zeros((640, 3), np.uint8)
 
-    robot.board.camera.look(rows)
+    robot.board.camera.show_rows(rows)
     robot.configure(po6030())
     capture(robot, 3, 4)
     line = 800 * 4 * 4
@@ -420,7 +421,7 @@ def test_pixel_sources_are_called_for_read_lines_only(robot):
         asked.append((y, columns.tolist(), cycle))
         return np.zeros((len(columns), 3), np.uint8)
 
-    robot.board.camera.sample(pixels)
+    robot.board.camera.show_pixels(pixels)
     robot.configure(po6030())
     robot.later(5_000_000)
     assert asked == []
@@ -473,7 +474,7 @@ def test_decoding_gives_back_what_the_format_keeps(form):
 def test_a_source_with_a_wrong_number_of_pixels_is_refused(robot):
     """A pixel source that returns a wrong number of pixels is refused, and the record is unchanged."""
     robot.configure(po6030())
-    robot.board.camera.sample(lambda _y, columns, _cycle: np.zeros((len(columns) + 1, 3), np.uint8))
+    robot.board.camera.show_pixels(lambda _y, columns, _cycle: np.zeros((len(columns) + 1, 3), np.uint8))
     with pytest.raises(ValueError, match="expected 101 pixels"):
         robot.board.camera.frame()
 
@@ -580,3 +581,14 @@ def test_timers_on_sync_lines_are_switched_alike_with_and_without_the_rule(seed)
             fields = {record.field_at(i) for i, (one, other) in enumerate(zip(*both, strict=True)) if one != other}
             pytest.fail(f"step {step}, {register} = {value:#x}, lanes {lanes:#x}: {fields}")
     assert sum(followed) > 20
+
+
+def test_the_old_spelling_of_show_pixels_warns(robot: Robot) -> None:
+    """`Camera.sample` of release 0.2 sets the scene and names the new spelling."""
+
+    def pixels(_y: int, columns: Any, _cycle: int) -> Any:
+        return np.zeros((len(columns), 3), np.uint8)
+
+    with pytest.warns(DeprecationWarning, match="show_pixels"):
+        robot.board.camera.sample(pixels)
+    assert robot.board.camera.pixel_source is pixels

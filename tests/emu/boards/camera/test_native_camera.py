@@ -49,7 +49,7 @@ def test_native_and_python_lines_are_equal(sensor: str, writes: list[tuple[int, 
     robot, pixels, draw = Robot(camera=sensor), scene(), random.Random(repr((sensor, writes)))
     robot.configure(writes)
     camera = robot.board.camera
-    camera.sample(lambda y, columns, _cycle: pixels[y, columns], has_native_source=True)
+    camera.show_pixels(lambda y, columns, _cycle: pixels[y, columns], has_native_source=True)
     camera.lamp = lamp
     course = camera.scan.timing
     assert camera._refresh(camera.scan.href(0, 3))  # Python renders first
@@ -73,7 +73,7 @@ def test_a_still_picture_is_rendered_like_a_callback(sensor: str, monkeypatch: p
     pixels, draw = scene(), random.Random(sensor)
     still, other = Robot(camera=sensor), Robot(camera=sensor)
     still.board.camera.show(pixels)
-    other.board.camera.sample(lambda y, columns, _cycle: pixels[y, columns])
+    other.board.camera.show_pixels(lambda y, columns, _cycle: pixels[y, columns])
     at_once = 0
     paint = Camera._render_natively
 
@@ -125,7 +125,7 @@ def test_python_renders_first_after_every_change() -> None:
     def source(y, columns, _cycle):
         return pixels[y, columns]
 
-    camera.sample(source, has_native_source=True)
+    camera.show_pixels(source, has_native_source=True)
     assert asked()
     assert not asked()
     kept = robot.machine.snapshot()
@@ -133,10 +133,10 @@ def test_python_renders_first_after_every_change() -> None:
     assert asked()
     robot.machine.restore(kept)
     assert asked()
-    camera.sample(source)
+    camera.show_pixels(source)
     assert not asked()
     assert not camera.native.setting
-    camera.sample(source, has_native_source=True)
+    camera.show_pixels(source, has_native_source=True)
     assert asked()
     setting = camera.native.setting
     assert painted_by_code(camera.scan.href(3, 2)) >= 0

@@ -389,7 +389,7 @@ def subject(seed: int, engine: str, stretches: dict[int, list[int]], chip: Chip 
         return np.full((len(columns), 3), y & 0xFF, np.uint8)
 
     if robot and camera is not None:
-        machine.board.camera.sample(row)
+        machine.board.camera.show_pixels(row)
         machine.board.camera.align(3_000 + draw.randrange(3_000), 0)
     return made
 
