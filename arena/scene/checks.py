@@ -94,6 +94,18 @@ def check_off(errors: TableErrors, off: Points, robots: int) -> None:
         taken.add(one[0])
 
 
+def check_start_poses(errors: TableErrors, key: str, poses: Points, sizes: Sequence[int]) -> None:
+    """Check `start.robot_poses` or `start.object_poses`; `sizes` are the numbers that the pose of each body has."""
+    if len(poses) != len(sizes):
+        words = f"start.{key} has {len(poses)} poses; expected one for each of {len(sizes)} bodies"
+        raise errors.at("start", key, words)
+    for number, (pose, size) in enumerate(zip(poses, sizes, strict=True)):
+        if len(pose) != size:
+            words = f"start.{key}: pose {number} has {len(pose)} numbers; expected " + ("x, y, degrees" if size == 3
+                                                                                        else "x, y")  # fmt: skip
+            raise errors.at("start", key, words)
+
+
 def check_limits(errors: TableErrors, name: str, table: Any, number: int | None = None) -> None:
     """Check the numbers of a table against `limits.LIMITS`. Raises SceneError."""
     for key, (low, high) in LIMITS[type(table)].items():

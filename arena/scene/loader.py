@@ -25,6 +25,7 @@ from arena.scene.checks import (
     check_overhead,
     check_polygon,
     check_shape,
+    check_start_poses,
     wrong_points,
 )
 from arena.scene.robot_kind import KINDS, RobotKind
@@ -384,6 +385,10 @@ def _checked(scene: Scene, errors: TableErrors) -> Scene:
     robots = range(scene.robots.count)
     check_links(errors, scene.bluetooth.links, [scene.robot_kind(robot).name for robot in robots])
     check_off(errors, scene.start.off, scene.robots.count)
+    if scene.start.robot_poses or scene.start.object_poses:
+        check_start_poses(errors, "robot_poses", scene.start.robot_poses, [3] * scene.robots.count)
+        sizes = [3 if scene.kind_of(number).polygon else 2 for number in range(scene.objects.count)]
+        check_start_poses(errors, "object_poses", scene.start.object_poses, sizes)
     if scene.arena.polygon:
         check_polygon(errors, "arena", scene.arena.polygon, None)
         if min(value for point in scene.arena.polygon for value in point) < 0:

@@ -45,8 +45,11 @@ def hexagonal(count: int, spacing: float) -> list[Place]:
 def place_all(scene: Scene, rng: np.random.Generator) -> tuple[list[tuple[float, float, float]], list[Place]]:
     """Return the poses of the robots (x, y in cm, heading in rad) and the positions of the objects, without contacts.
 
-    Raises SceneError if there is no room: too few marks, or marks too near each other or to a wall.
+    Poses in [start] are returned as they are, with contacts. Raises SceneError if there is no room: too few marks,
+    marks too near each other or to a wall, or a pose outside the walls.
     """
+    if scene.start.robot_poses or scene.start.object_poses:
+        return _start_poses(scene)
     if scene.groups or scene.kinds or scene.is_furnished:
         return _Placer(scene, rng).place()
     radii = [EPUCK.radius_cm] * scene.robots.count + [scene.objects.radius_cm] * scene.objects.count
@@ -65,6 +68,18 @@ def place_all(scene: Scene, rng: np.random.Generator) -> tuple[list[tuple[float,
     headings = rng.uniform(-math.pi, math.pi, scene.robots.count).tolist()
     robots = [(x, y, angle) for (x, y), angle in zip(chosen, headings, strict=False)]
     return robots, chosen[scene.robots.count :]
+
+
+def _start_poses(scene: Scene) -> tuple[list[tuple[float, float, float]], list[Place]]:
+    """Return the poses of robots and objects in [start]. Raises SceneError for one outside the walls."""
+    arena = scene.arena
+    for key, poses in (("robot_poses", scene.start.robot_poses), ("object_poses", scene.start.object_poses)):
+        for x, y, *_ in poses:
+            inside = 0 < x < arena.width_cm and 0 < y < arena.height_cm
+            if not inside or (arena.polygon and not geometry.contains(arena.polygon, x, y)):
+                raise SceneError(f"{scene.name}: start.{key}: ({x:g}, {y:g}) cm is outside the walls")
+    robots = [(x, y, math.radians(degrees)) for x, y, degrees in scene.start.robot_poses]
+    return robots, [(*pose[:2], *map(math.radians, pose[2:])) for pose in scene.start.object_poses]
 
 
 def outlines_of(scene: Scene) -> list[geometry.Side]:

@@ -162,6 +162,9 @@ class Start:
     - `off` are pairs of a robot, numbered from 0, and the second at which its battery is removed. From then on it stays
       at rest and dark.
     - A robot without a motor step, a LED change or a byte on UART1 for `silent_s` is reported.
+    - `robot_poses` and `object_poses` are the poses of all robots and of all objects, instead of those by `place`: x
+      and y in cm, and of robots and polygons the heading in degrees. Bodies may touch each other. `--start RECORD` of
+      `arena run` sets those at the end of a recorded trial.
     """
 
     spread_tcy: int = 1_600_000
@@ -172,6 +175,8 @@ class Start:
     stimulus: str = ""
     off: Points = ()
     silent_s: float = 60.0
+    robot_poses: Points = ()
+    object_poses: Points = ()
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import math
 import re
 import tomllib
 from contextlib import suppress
@@ -19,7 +20,7 @@ from arena.robots.reactive import SPEED_TABLES
 from arena.scene.loader import Scene, SceneError, load_scene, scripted
 from arena.scene.robot_kind import EPUCK, KILOBOT
 from arena.scene.schema import RobotGroup
-from arena.trial.record import EXPERIMENT, write_bytes
+from arena.trial.record import EXPERIMENT, read_trial, write_bytes
 from emu.host.paths import use_cache
 
 DEFAULT_BRAIN, SCRIPTED, DEFAULT_CONTROLLER = "openswarm", "scripted", "A"
@@ -58,6 +59,12 @@ def add_plan(command: argparse.ArgumentParser) -> None:
         help="seed of the first trial; each next trial has the next seed (default 1)",
     )
     command.add_argument(
+        "--start",
+        type=Path,
+        metavar="RECORD",
+        help="begin where the robots and objects of a recorded trial ended (trial-NNNN.parquet); firmware starts anew",
+    )
+    command.add_argument(
         "--cache", type=use_cache, metavar="DIR", help="folder of the cache for firmware and native code"
     )
 
@@ -75,6 +82,20 @@ def with_overrides(scene: Scene, settings: list[str], robots: int | None = None,
     if objects is not None:
         values["objects__count"] = objects
     return scene.with_values(**values)
+
+
+def start_at_end_of(scene: Scene, record: Path) -> Scene:
+    """Return a scene whose robots and objects begin at their poses in the last sample of a record.
+
+    Raises RecordError for an unusable record, SceneError if the scene has other numbers of robots or objects."""
+    trial = read_trial(record)
+    turned = [trial.columns[f"r{robot}_heading"][-1] for robot in range(trial.scene.robots.count)]
+    robots = [(x, y, math.degrees(heading)) for (x, y), heading in zip(trial.robots[-1].tolist(), turned, strict=True)]
+    objects = [(*pose[:2], *map(math.degrees, pose[2:])) for pose in trial.object_poses[-1]]
+    try:
+        return scene.with_values(start__robot_poses=robots, start__object_poses=objects)
+    except SceneError as error:
+        raise SceneError(f"--start {record}: {error}") from None
 
 
 def parse_value(text: str) -> bool | int | float | str | list[Any]:
@@ -98,8 +119,10 @@ def folder_name(text: str) -> str:
 
 
 def plan_from(options: argparse.Namespace, trials: int) -> Plan:
-    """Return the plan that the options of `add_plan` define. Raises SceneError, LoadError, ValueError."""
+    """Return the plan that the options of `add_plan` define. Raises SceneError, RecordError, LoadError, ValueError."""
     scene = with_overrides(load_scene(options.scene), options.set, options.robots, options.objects)
+    if options.start is not None:
+        scene = start_at_end_of(scene, options.start)
     home = Path(options.scene).parent
     if options.brain is not None and all(group.image for group in scene.groups):
         scene = replace(scene, groups=tuple(replace(group, image="") for group in scene.groups))
@@ -113,7 +136,10 @@ def plan_from(options: argparse.Namespace, trials: int) -> Plan:
     own_images = list(kinds)
     images = tuple((one, image_for(one, home, kind)) for one, kind in kinds.items())
     bare = {group.kind for group in scene.groups if not group.image}
-    if KILOBOT.name in bare and (len(bare) > 1 or options.brain is None):
+    if len(bare) > 1 and options.brain is not None:
+        raise SceneError(f"{scene.name}: --brain {options.brain} cannot run on robots of two kinds; name an `image` in "
+                         "the [[robots]] tables of one kind")  # fmt: skip
+    if KILOBOT.name in bare and options.brain is None:
         raise SceneError(f"{scene.name}: robots.image: a Kilobot runs the image of a firmware; none is named")
     if scene.groups and all(group.image for group in scene.groups):
         brain, image = "+".join(dict.fromkeys(Path(one).stem for one in own_images)), None

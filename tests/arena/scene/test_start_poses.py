@@ -1,0 +1,72 @@
+"""Start poses: `--start RECORD` begins where a recorded trial ended; numbers in [start] are checked."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import pytest
+
+from arena.campaign.bundle import pack, verify
+from arena.cli import main
+from arena.scene.loader import SceneError, load_scene
+from arena.trial.record import read_trial
+from arena.world.physics import World
+
+
+def run(scene: str, folder: Path, *words: object) -> int:
+    command = ["run", scene, "--brain", "scripted", "--minutes", "0.05", "--trials", "1", "--jobs", "1"]
+    return main([*command, "--out", str(folder), *map(str, words)])
+
+
+@pytest.mark.parametrize("scene", ["clustering", "chen2015"])
+def test_a_trial_begins_where_another_one_ended(scene: str, tmp_path: Path) -> None:
+    """Positions of robots and objects, and headings of robots and polygons, are those of the record's last sample."""
+    record = tmp_path / "first" / "trial-0001.parquet"
+    assert run(scene, tmp_path / "first") == 0
+    assert run(scene, tmp_path / "second", "--start", record, "--seed", 7) == 0
+    before, after = read_trial(record), read_trial(tmp_path / "second" / "trial-0001.parquet")
+    assert after.robots[0] == pytest.approx(before.robots[-1], abs=1e-9)
+    for one, other in zip(after.object_poses[0], before.object_poses[-1], strict=True):
+        assert one == pytest.approx(other, abs=1e-9)
+    for robot in range(after.scene.robots.count):
+        turned = after.columns[f"r{robot}_heading"][0] - before.columns[f"r{robot}_heading"][-1]
+        assert math.remainder(turned, math.tau) == pytest.approx(0, abs=1e-9)
+
+
+def test_a_bundle_of_such_a_run_verifies_without_the_first_record(tmp_path: Path) -> None:
+    """The manifest has the poses, so that a bundle does not need the record that they come from."""
+    assert run("clustering", tmp_path / "first") == 0
+    record = tmp_path / "first" / "trial-0001.parquet"
+    assert run("clustering", tmp_path / "second", "--start", record) == 0
+    record.unlink()
+    pack([tmp_path / "second"], tmp_path / "x.zip")
+    assert [check.equal for check in verify(tmp_path / "x.zip", lambda numbers: numbers)] == [True]
+
+
+@pytest.mark.parametrize(
+    ("words", "expected"),
+    [
+        (["--robots", "3"], "clustering: start.robot_poses has 5 poses; expected one for each of 3 bodies"),
+        (["--objects", "30"], "clustering: start.object_poses has 20 poses; expected one for each of 30 bodies"),
+        (["--set", "arena.width_cm=90"], "cm is outside the walls"),
+    ],
+)
+def test_a_record_of_another_world_is_refused(
+    words: list[str], expected: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Other numbers of bodies, and poses outside the walls, end with status 2 and a message that names the key."""
+    assert run("clustering", tmp_path / "first") == 0
+    assert run("clustering", tmp_path / "second", "--start", tmp_path / "first" / "trial-0001.parquet", *words) == 2
+    assert expected in capsys.readouterr().err
+    assert not list(tmp_path.glob("second/*.parquet"))
+
+
+def test_listed_poses_may_touch_and_have_the_right_size() -> None:
+    """Bodies that touch are accepted; a robot needs x, y, degrees."""
+    scene = load_scene("clustering").with_values(robots__count=2, objects__count=1)
+    touching = scene.with_values(start__robot_poses=[[50, 50, 0], [57, 50, 90]], start__object_poses=[[60, 50]])
+    world = World(touching, 1)
+    assert [round(math.degrees(pose[2])) for pose in world.poses.robots] == [0, 90]
+    with pytest.raises(SceneError, match="pose 1 has 2 numbers; expected x, y, degrees"):
+        scene.with_values(start__robot_poses=[[50, 50, 0], [57, 50]], start__object_poses=[[60, 50]])
