@@ -155,7 +155,7 @@ def _compile(options: CcOptions, jobs: dict[Input, ClangJob]) -> dict[Input, byt
     for (item, job), is_quiet in zip(missing.items(), quiet, strict=True):
         found[item] = _ir_of(options, job)
         if item in cached and is_quiet:
-            cache.add(job, rules[item].read_text(), found[item])
+            cache.add(job, os.fsdecode(rules[item].read_bytes()), found[item])
     return found
 
 

@@ -7,8 +7,8 @@ The entry names the headers that clang read, with their hashes. It also names th
 the same name: a new file there could be the one that clang reads instead. An entry is valid while nothing of this
 differs.
 
-Not cached: sources with messages, dependency files (-MD), and sources or headers whose meaning depends on the time or
-on the existence of other files (`__TIME__`, `__has_include`).
+Not cached: sources with messages, dependency files (-MD), and sources, headers or flags whose meaning depends on the
+time or on the existence of other files (`__TIME__`, `__has_include`).
 """
 
 from __future__ import annotations
@@ -33,11 +33,18 @@ from toolchain.frontend.options import CcOptions, Input
 LIMIT_BYTES: Final = 64 << 20
 COMPRESSION: Final = 1
 """Level of zlib: the fastest."""
-VARYING: Final = (b"__DATE__", b"__TIME__", b"__TIMESTAMP__", b"__has_include", b"__has_embed")
-"""Words of a source whose meaning depends on more than the content of files."""
+VARYING: Final = re.compile(rb"__(DATE|TIME|TIMESTAMP)__|__has_(include|embed)|[Pp]ragma.*\bdependency\b")
+"""Words of a source or flag whose meaning depends on more than the content of files."""
+LEADING_DOTS: Final = re.compile(r"^(\./+)+")
+SPLICE: Final = re.compile(rb"\\\r?\n")
+CLOCK_TICK: Final = 0.02
+"""Maximum delay in seconds of the clock that stamps files behind that of `time.time`."""
 PREFIX_MAP: Final = re.compile(r"-f(file|debug)-prefix-map=([^=]*)=(.*)")
 SEARCH_FLAGS: Final = ("-I", "-iquote", "-isystem", "-idirafter")
-ENVIRONMENT: Final = ("CPATH", "C_INCLUDE_PATH", "SOURCE_DATE_EPOCH")
+FORCED_INCLUDES: Final = ("-include", "-imacros")
+HEADER_PATHS: Final = ("CPATH", "C_INCLUDE_PATH")
+"""Environment variables with folders that clang searches for headers."""
+ENVIRONMENT: Final = (*HEADER_PATHS, "SOURCE_DATE_EPOCH", "CCC_OVERRIDE_OPTIONS")
 DEPENDENCY: Final = re.compile(r"(?:\\[^\n]|[^\s\\])+")
 OWN_HEADERS: Final = {str(INCLUDE_DIR): "<toolchain>", str(builtin_include_dir()): "<clang>"}
 """Folders whose headers test only for each other's existence, with the names that keys and entries contain instead."""
@@ -76,16 +83,19 @@ class IrCache:
         read = {_unescaped(word) for word in DEPENDENCY.findall(dependencies.partition(":")[2])} | {str(job.source)}
         headers = sorted(read - {str(job.source)})
         hashes = {path: self._hash(path) for path in headers}
-        if None in hashes.values() or any(os.stat(path).st_mtime >= self._started for path in read):
+        if None in hashes.values() or any(os.stat(path).st_mtime >= self._started - CLOCK_TICK for path in read):
             return
-        if any(self._is_varying(path) for path in read):
+        if any(VARYING.search(os.fsencode(word)) for word in job.arguments) or any(map(self._is_varying, read)):
             return
-        folders = sorted({os.path.dirname(path) or "." for path in read} | set(_search_folders(job)))
-        maps = [old for _, old, _ in _prefix_maps(job) if old not in folders and old.startswith(tuple(folders))]
-        if any(path.startswith(old) for path in headers for old in maps):  # the key does not tell how it is named
+        folders = sorted({os.path.dirname(path) or "." for path in read} | _header_folders(job))
+        maps = [old for _, old, _ in _prefix_maps(job) if old not in folders and old.startswith((".", *folders))]
+        named = [*headers, *(f"./{path}" for path in headers)]
+        if any(path.startswith(old) for path in named for old in maps):  # the key does not tell how it is named
             return
         names = {path[len(folder) + 1 :] for folder in folders for path in headers if path.startswith(f"{folder}/")}
         names |= {os.path.basename(path) for path in headers}
+        if "." in folders:
+            names |= {path for path in headers if not os.path.isabs(path)}
         record = {"headers": hashes, "folders": folders, "names": sorted(names),
                   "others": self._others(headers, folders, sorted(names))}  # fmt: skip
         head = _portable(json.dumps(record))
@@ -114,7 +124,7 @@ class IrCache:
         found = self._varies.get(path)
         if found is None:
             content = b"" if path.startswith(tuple(OWN_HEADERS)) else _content(path)
-            found = self._varies[path] = any(word in content for word in VARYING)
+            found = self._varies[path] = VARYING.search(SPLICE.sub(b"", content)) is not None
         return found
 
     def _is_present(self, path: str) -> bool:
@@ -179,6 +189,23 @@ def _search_folders(job: ClangJob) -> list[str]:
     words = job.arguments
     folders = [after for word, after in pairwise(words) if word in SEARCH_FLAGS]
     return folders + [word[2:] for word in words if word.startswith("-I") and len(word) > 2]
+
+
+def _header_folders(job: ClangJob) -> set[str]:
+    """Return the folders in which clang searches headers, without those of the including files.
+
+    A forced include is first searched in the working folder.
+    """
+    folders = _search_folders(job)
+    folders += [one for name in HEADER_PATHS if (paths := os.environ.get(name)) for one in paths.split(os.pathsep)]
+    if any(word in FORCED_INCLUDES and not os.path.isabs(after) for word, after in pairwise(job.arguments)):
+        folders.append(".")
+    return {_dependency_name(folder) for folder in folders}
+
+
+def _dependency_name(folder: str) -> str:
+    """Return the folder of a header as dependency files write it: without a leading `./` and slashes at the end."""
+    return LEADING_DOTS.sub("", folder + "/").rstrip("/") or ("/" if folder.startswith("/") else ".")
 
 
 def _unescaped(word: str) -> str:

@@ -81,6 +81,7 @@ def test_only_changed_files_are_compiled(compiled: Compiled) -> None:
 
 @pytest.mark.parametrize("text", [
     "int other(int x) { return x + __TIME__[0]; }\n",
+    "int other(int x) { return x + __TI\\\nME__[0]; }\n",
     '#if __has_include("absent.h")\n#error\n#endif\nint other(int x) { return x; }\n',
     "int other(int x) { int unused; return x; }\n",
 ])  # fmt: skip
@@ -88,6 +89,75 @@ def test_a_file_that_varies_or_has_warnings_is_compiled_each_time(compiled: Comp
     compiled.write("other.c", text)
     assert compiled("-Wall")[0] == BOTH
     assert compiled("-Wall")[0] == ["other.c"]
+
+
+@pytest.mark.parametrize(("options", "source", "found", "new"), [
+    (["-Ilate", "-include", "x.h"], "src/m.c", "late/x.h", "x.h"),
+    (["-Ilate", "-imacros", "x.h"], "src/m.c", "late/x.h", "x.h"),
+    (["-Iearly/", "-Ilate/", "-DHEADER=<sub/x.h>"], "src/m.c", "late/sub/x.h", "early/sub/x.h"),
+    (["-Iearly", "-I.", "-DHEADER=<sub/x.h>"], "m.c", "sub/x.h", "early/sub/x.h"),
+    (["-I./early", "-I./late", "-DHEADER=<sub/x.h>"], "src/m.c", "late/sub/x.h", "early/sub/x.h"),
+    (["-DHEADER=<x.h>"], "src/m.c", "by_environment/x.h", "first/x.h"),
+])  # fmt: skip
+def test_a_new_file_that_clang_finds_first_is_compiled(
+    compiled: Compiled, monkeypatch: pytest.MonkeyPatch, options: list[str], source: str, found: str, new: str
+) -> None:
+    """Forced includes, folders with a slash at the end or a dot before, and folders of the environment."""
+    monkeypatch.chdir(compiled.folder)
+    monkeypatch.setenv("CPATH", "first:by_environment")
+    for folder in ("early", "first"):
+        (compiled.folder / folder).mkdir(exist_ok=True)
+    compiled.write(source, "#ifdef HEADER\n#include HEADER\n#endif\nint other(void) { return X; }\n")
+    compiled.write(found, "#define X 1\n")
+    words = ["-fcache-ir", *options, "-c", source, "-o", "m.o"]
+    seen = []
+    for is_new in (False, False, True):
+        if is_new:
+            compiled.write(new, "#define X 2\n")
+        compiled.runs.clear()
+        assert driver.main(words) == 0
+        seen.append((compiled.runs == ["m.c"], (compiled.folder / "m.o").read_bytes()))
+    assert [ran for ran, _ in seen] == [True, False, True]
+    assert seen[0][1] == seen[1][1] != seen[2][1]
+
+
+@pytest.mark.parametrize("flag", ["-DODD=__TIME__", "-DODD=__has_include"])
+def test_a_file_with_a_flag_that_varies_is_compiled_each_time(compiled: Compiled, flag: str) -> None:
+    assert compiled(flag)[0] == BOTH
+    assert compiled(flag)[0] == BOTH
+
+
+def test_an_override_of_clangs_options_is_another_entry(compiled: Compiled, monkeypatch: pytest.MonkeyPatch) -> None:
+    first = compiled()
+    monkeypatch.setenv("CCC_OVERRIDE_OPTIONS", "# +-DADDED")
+    assert compiled()[0] == BOTH
+    monkeypatch.delenv("CCC_OVERRIDE_OPTIONS")
+    assert compiled() == ([], first[1])
+
+
+def test_a_header_whose_name_is_no_text_is_cached(compiled: Compiled) -> None:
+    name = os.fsdecode(b"caf\xe9.h")
+    compiled.write(name, "#define X 1\n")
+    (compiled.folder / "other.c").write_bytes(b'#include "caf\xe9.h"\nint other(int x) { return x + X; }\n')
+    os.utime(compiled.folder / "other.c", (time.time() - 60,) * 2)
+    first = compiled()
+    assert compiled() == ([], first[1])
+    compiled.write(name, "#define X 2\n")
+    assert compiled()[0] == ["other.c"]
+
+
+def test_debug_information_names_headers_by_the_given_map(
+    compiled: Compiled, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(compiled.folder)
+    compiled.write("x.h", "static inline int own(int x) { return x; }\n")
+    compiled.write("other.c", '#include "x.h"\nint other(int x) { return own(x); }\n')
+    images = []
+    for mapped in ("one", "two"):
+        words = ["-fcache-ir", "-g", "-O0", f"-fdebug-prefix-map=./={mapped}/", "-c", "other.c", "-o", "o.o"]
+        assert driver.main(words) == 0
+        images.append((compiled.folder / "o.o").read_bytes())
+    assert images[0] != images[1]
 
 
 def test_a_file_changed_during_the_run_is_not_cached(compiled: Compiled) -> None:
