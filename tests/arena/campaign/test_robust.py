@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import signal
+import socket
 import subprocess
 import sys
 import time
@@ -35,11 +36,22 @@ def start_arena(*arguments: object) -> subprocess.Popen[str]:
     return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=ROOT)
 
 
-def wait_for(path: Path, seconds: float = HANG) -> None:
-    end = time.monotonic() + seconds
+def wait_for(path: Path) -> None:
+    end = time.monotonic() + HANG
     while not path.exists():
         assert time.monotonic() < end, f"{path} did not appear"
         time.sleep(0.02)
+
+
+def wait_for_port(port: int) -> None:
+    end = time.monotonic() + HANG
+    while True:
+        try:
+            socket.create_connection(("127.0.0.1", port)).close()
+            return
+        except OSError:
+            assert time.monotonic() < end, f"no server at port {port}"
+            time.sleep(0.1)
 
 
 @pytest.mark.parametrize(
@@ -112,19 +124,36 @@ def test_a_sweep_cannot_choose_a_folder_by_its_values(tmp_path: Path) -> None:
     assert all(path.parent == tmp_path / "deep" / "deeper" for path in made)
 
 
+STOPPED = """
+import os, signal, sys
+from arena.campaign import campaign
+from arena.cli import main
+
+run_one = campaign.run_one
+def run_after_stop(plan, number, *rest, **options):
+    if number == 1:
+        os.kill(os.getpid(), signal.SIGSTOP)
+    return run_one(plan, number, *rest, **options)
+
+campaign.run_one = run_after_stop
+sys.exit(main(sys.argv[1:]))
+"""
+"""The command line of `arena`, stopped before its first trial until SIGCONT."""
+
+
 def test_two_runs_do_not_share_a_folder(tmp_path: Path) -> None:
     """The second run ends with status 3 and changes nothing; the first run is unaffected."""
-    long = ["run", "clustering", "--brain", "scripted", "--minutes", "1", "--trials", "3", "--jobs", "1"]
-    first = start_arena(*long, "--out", tmp_path)
+    words = [*SHORT[:6], "--trials", "3", "--jobs", "1", "--out", str(tmp_path)]
+    first = subprocess.Popen([sys.executable, "-c", STOPPED, *words], stdout=subprocess.DEVNULL, cwd=ROOT)
     wait_for(tmp_path / "manifest.json")
-    first.send_signal(signal.SIGSTOP)  # keeps it running when the second one starts
     second = start_arena(*SHORT, "--seed", 99, "--out", tmp_path)
     output = second.communicate(timeout=HANG)[1]
+    os.waitpid(first.pid, os.WUNTRACED)
     first.send_signal(signal.SIGCONT)
     assert second.returncode == 3
     assert output.count("\n") == 1
     assert "another run is writing here" in output
-    assert first.wait(120) == 0
+    assert first.wait(HANG) == 0
     manifest = json.loads((tmp_path / "manifest.json").read_text())
     assert manifest["key"]["seed"] == 1
     assert [one["trial"] for one in manifest["host"]] == [1, 2, 3]
@@ -255,7 +284,8 @@ def test_a_worker_of_another_version_is_refused() -> None:
 def test_a_scheduler_that_dies_is_one_line_and_what_is_finished_stays(tmp_path: Path) -> None:
     """A lost scheduler is status 3; the same command without the cluster continues."""
     pytest.importorskip("distributed", reason="Dask is not installed (extra: cluster)")
-    port = 18786
+    with socket.create_server(("127.0.0.1", 0)) as free:
+        port = free.getsockname()[1]
     dask = [sys.executable, "-m", "distributed.cli.dask_scheduler", "--port", str(port), "--no-dashboard"]
     quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
     scheduler = subprocess.Popen(dask, **quiet)  # type: ignore[call-overload]
@@ -264,14 +294,9 @@ def test_a_scheduler_that_dies_is_one_line_and_what_is_finished_stays(tmp_path: 
                               cwd=ROOT, **quiet)  # type: ignore[call-overload]  # fmt: skip
     arguments = [*SHORT[:4], "--minutes", "3", "--trials", "40", "--jobs", "1", "--out", str(tmp_path)]
     try:
-        run = None
-        for _ in range(20):  # until the scheduler listens
-            run = start_arena(*arguments, "--scheduler", f"tcp://127.0.0.1:{port}")
-            time.sleep(3)
-            if run.poll() is None:
-                break
-        assert run is not None
-        wait_for(tmp_path / "trial-0001.parquet", 120)
+        wait_for_port(port)
+        run = start_arena(*arguments, "--scheduler", f"tcp://127.0.0.1:{port}")
+        wait_for(tmp_path / "trial-0001.parquet")
         scheduler.kill()
         output = run.communicate(timeout=HANG)[1]
         assert run.returncode == 3, output

@@ -57,12 +57,11 @@ def studio_of(plan: Plan) -> Iterator[Studio]:
 
 def wait_for_state(studio: Studio, state: str = "paused") -> dict[str, Any]:
     """Wait until the trial is in `state` or over, and return its status."""
-    for _ in range(1200):
-        now = studio.ask("status")
-        if now["state"] in (state, "over"):
-            return now
+    end = time.monotonic() + HANG
+    while (now := studio.ask("status"))["state"] not in (state, "over"):
+        assert time.monotonic() < end, f"still {now['state']}, not {state}"
         time.sleep(0.05)
-    raise AssertionError(f"still {now['state']}, not {state}")
+    return now
 
 
 def do(studio: Studio, name: str, *arguments: Any) -> dict[str, Any]:
