@@ -1,8 +1,9 @@
-"""Fixtures: the wheel and the baselines of a new project, which all worker processes of a run share."""
+"""The wheel and the baselines of a new project, which all worker processes of a run share; shorter measurements."""
 
 from __future__ import annotations
 
 import fcntl
+import subprocess
 import sys
 from pathlib import Path
 
@@ -13,6 +14,18 @@ import first_steps
 
 from openswarm.cli import main
 from tests.firmware.conftest import folder_of_run
+
+
+def shortened(project: Path) -> Path:
+    """Return a new project after limiting its measurements to 1.1 simulated seconds.
+
+    Each thread and the handler still run twice. The first steps (test_wheel.py) measure as long as the template says.
+    """
+    for file in (project / "Makefile", *project.glob("test/*.py")):
+        text = file.read_text()
+        assert "seconds 2.5" in text or "seconds=2.5" in text, file
+        file.write_text(text.replace("seconds 2.5", "seconds 1.1").replace("seconds=2.5", "seconds=1.1"))
+    return project
 
 
 @pytest.fixture(scope="session")
@@ -29,12 +42,13 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="session")
 def baselines(tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
-    """Return the baselines that `openswarm new robot` measures, by their names in the project; measured once per test
-    run."""
+    """Return the baselines of a `shortened` new project, by their names in it; measured once per test run."""
     folder = folder_of_run(tmp_path_factory) / "new" / "robot"
     folder.parent.mkdir(exist_ok=True)
     with folder.with_suffix(".lock").open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
         if not folder.exists():
-            assert main(["new", str(folder)]) == 0
+            assert main(["new", str(folder), "--no-baselines"]) == 0
+            openswarm = f"OPENSWARM={sys.executable} -m openswarm"
+            subprocess.run(["make", "-s", "-C", shortened(folder), "baselines", openswarm], check=True)
     return {f"test/{file.name}": file.read_bytes() for file in folder.glob("test/*.json")}

@@ -15,6 +15,7 @@ import yaml
 
 from emu.host import installation, paths
 from openswarm.cli import main
+from tests.openswarm.conftest import shortened
 from tests.watchdog import HANG
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -27,10 +28,12 @@ def run_command(folder: Path, *words: str, **environment: str) -> subprocess.Com
 
 
 def new(folder: Path, *words: str, baselines: dict[str, bytes] | None = None) -> Path:
-    """Return a new project, with the given baselines if any."""
+    """Return a new project; with baselines it is `shortened`, as the project is whose baselines they are."""
     assert main(["new", str(folder), *words, *["--no-baselines"] * (baselines is not None)]) == 0
-    for name, content in (baselines or {}).items():
-        (folder / name).write_bytes(content)
+    if baselines is not None:
+        shortened(folder)
+        for name, content in baselines.items():
+            (folder / name).write_bytes(content)
     return folder
 
 

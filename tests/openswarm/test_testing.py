@@ -14,6 +14,7 @@ import pytest
 import yaml
 
 from emu.host import paths
+from tests.openswarm.conftest import shortened
 from tests.vcd_reader import VCDVCD
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -131,6 +132,7 @@ def test_the_action_s_steps_as_they_are_from_the_wheel(wheel, baselines, tmp_pat
     environment = first_steps.install_wheel(wheel, tmp_path / "venv") | {"OPENSWARM_CACHE": str(paths.cache())}
     words = ["openswarm", "new", "robot", "--no-baselines"]
     subprocess.run(words, cwd=tmp_path, env=environment, check=True, capture_output=True)
+    shortened(tmp_path / "robot")
     for name, content in baselines.items():
         (tmp_path / "robot" / name).write_bytes(content)
     source = tmp_path / "robot" / "src" / "main.c"
