@@ -18,9 +18,10 @@ from emu.host.command import CommandError, Parser, seconds
 from emu.host.exit_status import FAULT
 from emu.image.loader import load_image
 from emu.image.model import Image
-from emu.kernel_metrics.application_cycles import ApplicationCycles, measure
+from emu.kernel_metrics.application_cycles import measure
 from emu.kernel_metrics.baseline import Baseline, Metric, MetricRow
 from emu.kernel_metrics.blame import CodeListing, grown_lines
+from emu.kernel_metrics.cycle_results import ApplicationCycles
 from emu.kernel_metrics.suite import latency
 from emu.kernel_metrics.suite import options as kernel_options
 from emu.kernel_metrics.target import MeasureError

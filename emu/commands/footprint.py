@@ -22,12 +22,13 @@ from emu.host.files import atomic_text_file
 from emu.image.footprint import UNKNOWN, Piece, pieces, totals
 from emu.image.loader import load_image
 from emu.image.model import BYTES_PER_WORD, Image
-from emu.kernel_metrics.application_memory import ApplicationMemory, engine_for, measure
+from emu.kernel_metrics.application_memory import engine_for, measure
 from emu.kernel_metrics.baseline import Baseline, Metric, MetricRow
 from emu.kernel_metrics.blame import LINES_SHOWN, short
 from emu.kernel_metrics.footprint_rows import grown_pieces, line_of, run_numbers, static_numbers
 from emu.kernel_metrics.kernel_structures import KernelStructures
 from emu.kernel_metrics.memory_picture import html, ram_parts, rom_parts, svg
+from emu.kernel_metrics.memory_results import ApplicationMemory
 from emu.kernel_metrics.memory_text import memory_text
 from emu.kernel_metrics.owners import sizes_by_owner
 from emu.kernel_metrics.suite import memory

@@ -11,9 +11,9 @@ from collections.abc import Sequence
 
 from emu.image.footprint import Piece, group
 from emu.image.model import Image
-from emu.kernel_metrics.application_memory import ApplicationMemory
 from emu.kernel_metrics.baseline import Metric
 from emu.kernel_metrics.blame import short
+from emu.kernel_metrics.memory_results import ApplicationMemory
 from emu.kernel_metrics.owners import sizes_by_owner
 
 

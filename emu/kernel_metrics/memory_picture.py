@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from html import escape
 from typing import Final
 
-from emu.kernel_metrics.application_memory import ApplicationMemory
+from emu.kernel_metrics.memory_results import ApplicationMemory
 
 WIDTH, BAR, GAP, MARGIN = 960, 64, 84, 16
 COLOURS: Final = {

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from emu.kernel_metrics.application_memory import ApplicationMemory
+from emu.kernel_metrics.memory_results import ApplicationMemory
 
 
 def memory_text(memory: ApplicationMemory) -> str:

@@ -9,7 +9,7 @@ import pytest
 
 import emu
 from emu.host.result_tables import data_frame, html_table
-from emu.kernel_metrics.application_cycles import ApplicationCycles, Operation
+from emu.kernel_metrics.cycle_results import ApplicationCycles, Operation
 from emu.profile.cycle_shares import Profiler
 from toolchain.driver import driver
 
