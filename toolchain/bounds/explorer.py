@@ -99,7 +99,9 @@ class _FunctionExecution(CallExecution):
 
     def _arrive(self, target: int, state: AbstractState) -> None:
         self.edges.add((self.source, target))
-        block = self.code.blocks[target]
+        block = self.code.blocks.get(target)
+        if block is None:  # no instruction: `run` reports it
+            return
         if block.steps[-1].flow is Return and len(block.steps) <= MAX_RETURN_BLOCK and target not in self.code.heads:
             self._block(block, state)  # states are not joined, so that return states stay separate by result
             return

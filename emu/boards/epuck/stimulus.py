@@ -106,6 +106,12 @@ def load_waveform(board: EpuckHardware, path: Path) -> list[StimulusStep]:
 
 
 LATEST: Final = 10**18
+MOST_CLOCKS: Final = 0xFFFF
+"""Maximum number of clocks for which a script holds SDA."""
+LARGEST_COUNT: Final = 4095
+"""Largest result of the 12-bit converter."""
+MOST_G: Final = 100
+"""Maximum acceleration in g; the sensor saturates far below."""
 _UNITS: Final = {"ms": Fraction(1, 1000), "us": Fraction(1, 1_000_000), "s": Fraction(1)}
 
 
@@ -130,8 +136,8 @@ def _action(board: EpuckHardware, words: list[str]) -> Action:
     kinds: dict[str, Callable[[EpuckHardware, list[str]], Action]] = {
         "selector": _selector,
         "remote": _remote,
-        "ir": lambda b, w: _two(w, lambda sensor, mm: b.ir.set_distance(_sensor(sensor), mm)),
-        "light": lambda b, w: _two(w, lambda sensor, counts: b.ir.set_ambient(_sensor(sensor), int(counts))),
+        "ir": _ir,
+        "light": _light,
         "battery": _battery,
         "tilt": _tilt,
         "uart1": lambda b, w: _uart(b, 1, w),
@@ -154,17 +160,27 @@ def _count(words: list[str], *allowed: int) -> None:
         raise ValueError(f"expected {' or '.join(map(str, allowed))} arguments, found {len(words)}")
 
 
-def _sensor(number: float) -> int:
+def _of_sensor(words: list[str]) -> tuple[int, float]:
+    """Return the sensor and the value behind it."""
+    _count(words, 2)
+    number, value = (float(word) for word in words)
     if number not in range(8):
         raise ValueError(f"sensors are 0 to 7, not {number:g}")
-    return int(number)
+    return int(number), value
 
 
-def _two(words: list[str], action: Callable[[float, float], None]) -> Action:
-    _count(words, 2)
-    first, second = (float(word) for word in words)
-    _sensor(first)
-    return lambda: action(first, second)
+def _ir(board: EpuckHardware, words: list[str]) -> Action:
+    sensor, millimetres = _of_sensor(words)
+    if not millimetres >= 0:
+        raise ValueError(f"a distance is 0 mm or more (inf: nothing), not {millimetres:g}")
+    return lambda: board.ir.set_distance(sensor, millimetres)
+
+
+def _light(board: EpuckHardware, words: list[str]) -> Action:
+    sensor, counts = _of_sensor(words)
+    if not 0 <= counts <= LARGEST_COUNT:
+        raise ValueError(f"ambient light is 0 to {LARGEST_COUNT} counts, not {counts:g}")
+    return lambda: board.ir.set_ambient(sensor, int(counts))
 
 
 def _selector(board: EpuckHardware, words: list[str]) -> Action:
@@ -200,6 +216,8 @@ def _battery(board: EpuckHardware, words: list[str]) -> Action:
 def _tilt(board: EpuckHardware, words: list[str]) -> Action:
     _count(words, 3)
     x, y, z = (float(word) for word in words)
+    if not all(abs(one) <= MOST_G for one in (x, y, z)):
+        raise ValueError(f"acceleration is {-MOST_G} to {MOST_G} g along each axis")
     return lambda: board.accelerometer.set_g(x, y, z)
 
 
@@ -275,6 +293,8 @@ def _i2c(board: EpuckHardware, words: list[str]) -> Action:
         return lambda: wire.hold(scl=True)
     if len(words) == 2 and words[0] == "sda":
         clocks = int(words[1])
+        if not 0 <= clocks <= MOST_CLOCKS:
+            raise ValueError(f"SDA is held for 0 (until `free`) to {MOST_CLOCKS} clocks, not {clocks}")
         return lambda: wire.hold(sda=True, clocks=clocks)
     raise ValueError("expected `sda CLOCKS`, `scl` or `free`")
 

@@ -61,6 +61,10 @@ def test_steps_happen_at_their_times(robot):
         ("1s camera off", "expected `plug`"), ("1s picture", "expected 1 arguments"),
         ("1s lamp -1", "brightness is"), ("1s bluetooth off", "`up` or `down`"),
         ("1s i2c sda", "expected `sda CLOCKS`"), ("1s noise -1", "strength of noise"),
+        ("1s light 3 4096", "0 to 4095 counts"), ("1s light 3 nan", "0 to 4095 counts"),
+        ("1s tilt 0 0 nan", "-100 to 100 g"), ("1s tilt inf 0 0", "-100 to 100 g"),
+        ("1s ir 0 nan", "0 mm or more"), ("1s ir nan 5", "sensors are 0 to 7"),
+        ("1s i2c sda 65536", "0 .until `free`. to 65535 clocks"), ("1s i2c sda -1", "to 65535 clocks, not -1"),
         ('1s uart1 "x" wrong', "expected one of framing"), ('1s uart1 "open', "No closing quotation"),
     ],
 )  # fmt: skip

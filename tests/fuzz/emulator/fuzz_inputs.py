@@ -58,13 +58,13 @@ int main(void)
     }
 }
 """
-STIMULUS = """0.5ms selector 3
-1ms remote ok   # OK
-1ms ir 0 20
-1ms light 3 2500
-2ms battery 3.3
-2ms tilt 0.1 0 0.98
-0.1ms uart1 "hello\\r"
+STIMULUS = """0.5us selector 3
+1us remote ok   # OK
+1us ir 0 20
+1us light 3 2500
+2us battery 3.3
+2us tilt 0.1 0 0.98
+0.1us uart1 "hello\\r"
 300 uart1 "x" framing
 4us pin RF6 0
 5us camera unplug

@@ -38,6 +38,16 @@ def test_a_shift_by_a_number_from_memory_has_a_bound(tmp_path: Path, capsys: pyt
     assert "main" in capsys.readouterr().out
 
 
+def test_a_path_into_data_ends_there(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A function that runs into words that are no instructions has no bound, and the report names the place."""
+    source, image = tmp_path / "falls.s", tmp_path / "falls.elf"
+    source.write_text("    .text\n    .global _main\n_main:\n    clr w0\n    .pword 0x0AFFF6\n    return\n")
+    assert main(["as", str(source), "-o", str(tmp_path / "falls.o")]) == 0
+    assert main(["cc", str(tmp_path / "falls.o"), "-o", str(image)]) == 0
+    assert main(["bounds", str(image)]) == 0
+    assert "_main+0x2: no instruction is here" in capsys.readouterr().out
+
+
 @pytest.mark.parametrize("counts", [(-5, 3), (-9, -2), (0, 4), (2, 20)])
 @pytest.mark.parametrize("values", [(-7, 5), (3, 9), (6, 6)])
 def test_a_shift_contains_all_results(counts: tuple[int, int], values: tuple[int, int]) -> None:
