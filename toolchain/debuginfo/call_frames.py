@@ -12,7 +12,9 @@ from dataclasses import dataclass, field, replace
 
 from toolchain.abi.target import FP, SP
 from toolchain.debuginfo.leb128 import sleb, uleb
-from toolchain.mir.mir import MI, Mem, MFunction
+from toolchain.mir.function import MFunction
+from toolchain.mir.instruction import MI
+from toolchain.mir.operands import Mem
 from toolchain.verify.stack import stack_change
 
 RETURN_BYTES = 4

@@ -10,7 +10,7 @@ from toolchain.debuginfo.leb128 import sleb, uleb
 from toolchain.debuginfo.metadata import DebugMetadata
 from toolchain.debuginfo.scopes import DebugEntry, FunctionInfo, LexicalScope, ScopeTree, split_name
 from toolchain.ir.model import Module
-from toolchain.mir.mir import CONSTANT_WORD, OPTIMISED_OUT
+from toolchain.mir.function import CONSTANT_WORD, OPTIMISED_OUT
 
 PRODUCER = "toolchain for dsPIC30F, clang front end"
 ENCODINGS = {"address": 1, "boolean": 2, "float": 4, "signed": 5, "signed_char": 6, "unsigned": 7, "unsigned_char": 8}

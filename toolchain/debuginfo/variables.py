@@ -12,8 +12,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from toolchain.debuginfo.bindings import BoundLine
+from toolchain.mir.function import OPTIMISED_OUT, MFunction, VariableLocation
+from toolchain.mir.instruction import MI
 from toolchain.mir.liveness import live_out
-from toolchain.mir.mir import MI, OPTIMISED_OUT, MFunction, VariableLocation
 
 RegisterValues = dict[int, int]
 """Number of the value that each register contains."""

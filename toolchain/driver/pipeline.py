@@ -24,7 +24,7 @@ from toolchain.ir import cfg
 from toolchain.ir.model import BlockAddress, ConstAgg, ConstExpr, Function, Module, UnsupportedError, Value
 from toolchain.ir.read import read_module
 from toolchain.legalize import legalize
-from toolchain.mir.mir import MFunction
+from toolchain.mir.function import MFunction
 from toolchain.optimise import (
     branches,
     by_value,

@@ -7,7 +7,10 @@ would shorten (isa.md §12). `end_atomic` emits no code. Needs: final instructio
 
 from __future__ import annotations
 
-from toolchain.mir.mir import MI, SKIPS, Imm, MFunction
+from toolchain.mir.function import MFunction
+from toolchain.mir.instruction import MI
+from toolchain.mir.operands import Imm
+from toolchain.mir.operations import SKIPS
 
 LIMIT = 0x3FFF  # greatest operand of DISI #lit14
 BRANCH_CYCLES = 3  # cycles of a taken branch with a stall

@@ -10,7 +10,9 @@ from toolchain.abi.names import block_label
 from toolchain.abi.target import SP
 from toolchain.debuginfo.call_frames import CallFrames
 from toolchain.debuginfo.variables import LocationLists, verified_locations
-from toolchain.mir.mir import MI, FileRegister, Imm, MBlock, Mem, MFunction, Operand
+from toolchain.mir.function import MBlock, MFunction
+from toolchain.mir.instruction import MI
+from toolchain.mir.operands import FileRegister, Imm, Mem, Operand
 
 MEM_TEXT = {"ind": "[w{}]", "++": "[w{}++]", "--": "[w{}--]", "+": "[++w{}]", "-": "[--w{}]"}
 RENAMED = {

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from toolchain.mir.mir import MI, MBlock, MFunction
+from toolchain.mir.function import MBlock, MFunction
+from toolchain.mir.instruction import MI
 
 SP_BIT = 1 << 15
 

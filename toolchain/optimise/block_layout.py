@@ -6,7 +6,7 @@ the same loop depth. As a consequence, a loop with the test at the top is laid o
 
 from __future__ import annotations
 
-from toolchain.mir.mir import MBlock, MFunction
+from toolchain.mir.function import MBlock, MFunction
 
 
 def run(m: MFunction) -> None:

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import copy
 
+from toolchain.mir.function import MBlock, MFunction
+from toolchain.mir.instruction import MI, covered_count
 from toolchain.mir.liveness import live_out, mask_of, summary
-from toolchain.mir.mir import CC_INVERSE, MI, FileRegister, Imm, MBlock, Mem, MFunction, covered_count
+from toolchain.mir.operands import FileRegister, Imm, Mem
+from toolchain.mir.operations import CC_INVERSE
 from toolchain.optimise import block_layout
 from toolchain.optimise.peephole import ALL, AT_RETURN
 

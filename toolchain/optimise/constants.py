@@ -6,8 +6,10 @@ Needs: virtual registers. A shared constant has a single definition, so the allo
 from __future__ import annotations
 
 from toolchain.ir.cfg import natural_loops
+from toolchain.mir.function import MBlock, MFunction
+from toolchain.mir.instruction import MI
 from toolchain.mir.liveness import live_out
-from toolchain.mir.mir import MI, Imm, MBlock, MFunction
+from toolchain.mir.operands import Imm
 
 REACH = 12  # maximum number of instructions between two uses of a shared constant
 LOOP_REGISTERS = 9  # maximum number of registers live in a loop including its constants: W0-W7 and one more

@@ -7,7 +7,9 @@ predecessor. Needs: real registers, frames built. The caller removes dead code w
 from __future__ import annotations
 
 from toolchain.abi.target import SP
-from toolchain.mir.mir import MI, FileRegister, Imm, MBlock, Mem, MFunction
+from toolchain.mir.function import MBlock, MFunction
+from toolchain.mir.instruction import MI
+from toolchain.mir.operands import FileRegister, Imm, Mem
 
 KnownConstant = tuple[str, object]
 RegisterFacts = dict[int, int | KnownConstant]

@@ -6,7 +6,9 @@ registers have a single definition, so the first register contains the value at 
 
 from __future__ import annotations
 
-from toolchain.mir.mir import FIRST_VIRTUAL, MI, Imm, MBlock, MFunction
+from toolchain.mir.function import MBlock, MFunction
+from toolchain.mir.instruction import MI
+from toolchain.mir.operands import FIRST_VIRTUAL, Imm
 from toolchain.optimise.peephole import flags_unused
 
 REACH = 12  # maximum number of instructions between the computations; longer live ranges cost registers

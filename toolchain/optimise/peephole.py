@@ -7,8 +7,11 @@ Needs: frames built. No rewrite adds an instruction.
 from __future__ import annotations
 
 from toolchain.abi.target import CALLEE_SAVED, FP, LIT10_BYTE_MAX, LIT10_MAX, SP
+from toolchain.mir.function import MBlock, MFunction
+from toolchain.mir.instruction import MI
 from toolchain.mir.liveness import live_out, mask_of, remove_dead_in_block
-from toolchain.mir.mir import MI, SKIPS, AddressingMode, Imm, MBlock, Mem, MFunction
+from toolchain.mir.operands import AddressingMode, Imm, Mem
+from toolchain.mir.operations import SKIPS
 from toolchain.optimise import copies
 
 AT_RETURN = mask_of([*CALLEE_SAVED, 15])

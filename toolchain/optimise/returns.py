@@ -9,7 +9,9 @@ from __future__ import annotations
 import copy
 
 from toolchain.abi.target import LIT10_MAX
-from toolchain.mir.mir import MI, Imm, MBlock, MFunction
+from toolchain.mir.function import MBlock, MFunction
+from toolchain.mir.instruction import MI
+from toolchain.mir.operands import Imm
 from toolchain.optimise.branches import remove_unreached
 
 RESULT = 0  # W0, the result register

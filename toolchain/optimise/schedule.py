@@ -7,8 +7,11 @@ pass moves an independent instruction between the two. Needs: final instructions
 from __future__ import annotations
 
 from toolchain.abi.target import SP
+from toolchain.mir.function import MFunction
+from toolchain.mir.instruction import MI
 from toolchain.mir.liveness import mask_of
-from toolchain.mir.mir import MI, SKIPS, STEPPING, Mem, MFunction
+from toolchain.mir.operands import STEPPING, Mem
+from toolchain.mir.operations import SKIPS
 
 WINDOW = 4
 

@@ -8,7 +8,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from toolchain.mir.mir import MEMORY, MI, MBlock, MFunction
+from toolchain.mir.function import MBlock, MFunction
+from toolchain.mir.instruction import MI
+from toolchain.mir.operands import MEMORY
 
 ENDS = {"ret", "tailcall"}
 

@@ -20,8 +20,10 @@ import copy
 from toolchain.abi.target import ALLOCATABLE, CALLEE_SAVED, CALLER_SAVED, FP
 from toolchain.debuginfo import variables
 from toolchain.ir.model import UnsupportedError
+from toolchain.mir.function import MFunction
+from toolchain.mir.instruction import MI, PairMove, pair_move
 from toolchain.mir.liveness import live_out, mask_of, registers_in, remove_dead
-from toolchain.mir.mir import FIRST_VIRTUAL, MI, MFunction, PairMove, pair_move
+from toolchain.mir.operands import FIRST_VIRTUAL
 from toolchain.regalloc.spill import rewrite_spills
 from toolchain.verify import allocation
 

@@ -14,7 +14,9 @@ import re
 
 from toolchain.abi.target import CALLEE_SAVED, CALLER_SAVED, FP, LIT5_MAX, LIT10_MAX, LNK_MAX, SP, WORD_OFFSET
 from toolchain.ir.model import UnsupportedError
-from toolchain.mir.mir import MI, FrameSlot, Imm, Mem, MFunction, Operand
+from toolchain.mir.function import MFunction
+from toolchain.mir.instruction import MI
+from toolchain.mir.operands import FrameSlot, Imm, Mem, Operand
 
 FRAME_POINTER_BYTES = 900  # maximum bytes of locals without LNK; the greatest literal of ADD #lit10 is 1023
 PROBE_REACH = 1022  # largest word offset of [Wn+lit] (isa.md §3)

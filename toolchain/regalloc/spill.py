@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Set
 
-from toolchain.mir.mir import MI, FrameObject, FrameSlot, Imm, MFunction, covered_count
+from toolchain.mir.function import FrameObject, MFunction
+from toolchain.mir.instruction import MI, covered_count
+from toolchain.mir.operands import FrameSlot, Imm
 
 REMATERIALISABLE = {"clr", "setm", "lea"}
 UNIT_REGISTERS = 12  # maximum number of registers used under one skip; the others are live across the skip

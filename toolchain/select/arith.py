@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from toolchain.ir.model import I1, ConstInt, Instr, Value
-from toolchain.mir.mir import Imm, Mem
+from toolchain.mir.operands import Imm, Mem
 from toolchain.select.context import Handler, SelectionContext
 from toolchain.select.rules import CARRY_OP, COMMUTES, REGISTER_OP, ImmediateRule, immediate_rule
 from toolchain.select.shifts import fill

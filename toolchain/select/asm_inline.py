@@ -7,7 +7,9 @@ from dataclasses import dataclass
 
 from toolchain.frontend.asm_constraints import CLASSES, MARK
 from toolchain.ir.model import ConstInt, GlobalRef, Instr, Type, UnsupportedError, Value, size_of
-from toolchain.mir.mir import FIRST_VIRTUAL, MI, Imm, Mem, Operand, opaque
+from toolchain.mir.instruction import MI
+from toolchain.mir.operands import FIRST_VIRTUAL, Imm, Mem, Operand
+from toolchain.mir.operations import opaque
 from toolchain.select.context import SelectionContext
 
 # Register names of the front end, which are those of the MSP430; r0-r3 have alternative names.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from toolchain.ir.model import ConstInt, Instr, Value
-from toolchain.mir.mir import AddressingMode, Imm, Mem
+from toolchain.mir.operands import AddressingMode, Imm, Mem
 from toolchain.select.context import Handler, SelectionContext
 
 MAX_UNROLLED_UNITS = 3  # maximum number of units copied one by one; larger copies and fills use REPEAT

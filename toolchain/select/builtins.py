@@ -5,7 +5,8 @@ from __future__ import annotations
 from emu.dspic30f.isa.debug import FAILED_CHECK, HALT
 from toolchain.abi.names import symbol
 from toolchain.ir.model import ConstInt, GlobalRef, Instr, UnsupportedError
-from toolchain.mir.mir import Imm, Mem, opaque
+from toolchain.mir.operands import Imm, Mem
+from toolchain.mir.operations import opaque
 from toolchain.select.context import Handler, SelectionContext
 
 

@@ -18,7 +18,7 @@ from toolchain.ir.model import (
     align_of,
     size_of,
 )
-from toolchain.mir.mir import FrameSlot, Imm, Mem
+from toolchain.mir.operands import FrameSlot, Imm, Mem
 from toolchain.select import asm_inline, builtins
 from toolchain.select.context import Handler, SelectionContext
 

@@ -5,7 +5,9 @@ from __future__ import annotations
 from toolchain.abi.target import LIT5_MAX, LIT10_BYTE_MAX, LIT10_MAX
 from toolchain.ir.build import SWAPPED
 from toolchain.ir.model import I1, ConstInt, Instr, Undef, Value
-from toolchain.mir.mir import CC_INVERSE, MI, Imm
+from toolchain.mir.instruction import MI
+from toolchain.mir.operands import Imm
+from toolchain.mir.operations import CC_INVERSE
 from toolchain.select.context import Handler, SelectionContext
 from toolchain.select.rules import CONDITION
 

@@ -7,7 +7,9 @@ instruction replaces it by the other value. That instruction is a move, a consta
 from __future__ import annotations
 
 from toolchain.ir.model import ConstInt, Instr, Undef, Value
-from toolchain.mir.mir import CC_INVERSE, MI, Imm
+from toolchain.mir.instruction import MI
+from toolchain.mir.operands import Imm
+from toolchain.mir.operations import CC_INVERSE
 from toolchain.select.arith import apply_rule
 from toolchain.select.compare import condition
 from toolchain.select.context import Handler, SelectionContext

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from toolchain.abi.sections import is_near
 from toolchain.abi.target import BYTE_OFFSET, WORD_OFFSET
 from toolchain.ir.model import ConstInt, GlobalRef, Instr, Value
-from toolchain.mir.mir import FileRegister, FrameSlot, Imm, Mem, Operand
+from toolchain.mir.operands import FileRegister, FrameSlot, Imm, Mem, Operand
 from toolchain.select.state import SelectionState
 
 

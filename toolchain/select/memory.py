@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from toolchain.ir.model import ConstInt, Instr, Value
-from toolchain.mir.mir import FileRegister, FrameSlot, Imm, Mem, Operand
+from toolchain.mir.operands import FileRegister, FrameSlot, Imm, Mem, Operand
 from toolchain.select.context import Handler, SelectionContext
 from toolchain.select.rules import COMMUTES, FILE_BINARY, FILE_CARRY, FILE_UNARY, REGISTER_OP, immediate_rule
 from toolchain.select.state import words_of

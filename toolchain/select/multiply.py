@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from toolchain.ir.model import ConstInt, Instr, Value
-from toolchain.mir.mir import Imm, Mem
+from toolchain.mir.operands import Imm, Mem
 from toolchain.select.context import Handler, SelectionContext
 from toolchain.select.state import words_of
 

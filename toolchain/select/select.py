@@ -12,7 +12,8 @@ from collections.abc import Callable
 
 from toolchain.ir.cfg import loop_depths, predecessors
 from toolchain.ir.model import Block, ConstInt, DbgRecord, Instr, Undef, UnsupportedError, Value
-from toolchain.mir.mir import CONSTANT_WORD, MI, OPTIMISED_OUT, MBlock, MFunction
+from toolchain.mir.function import CONSTANT_WORD, OPTIMISED_OUT, MBlock, MFunction
+from toolchain.mir.instruction import MI
 from toolchain.select import arith, block_copies, calls, compare, conditional, memory, multiply, shifts
 from toolchain.select.context import SelectionContext
 

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from toolchain.ir.model import ConstInt, Instr, Value
-from toolchain.mir.mir import MI, Imm, OpInfo
+from toolchain.mir.instruction import MI
+from toolchain.mir.operands import Imm
+from toolchain.mir.operations import OpInfo
 from toolchain.select.context import Handler, SelectionContext
 from toolchain.select.state import words_of
 

@@ -18,7 +18,9 @@ from toolchain.ir.model import (
     UnsupportedError,
     Value,
 )
-from toolchain.mir.mir import MI, FrameObject, FrameSlot, Imm, MFunction, Operand
+from toolchain.mir.function import FrameObject, MFunction
+from toolchain.mir.instruction import MI
+from toolchain.mir.operands import FrameSlot, Imm, Operand
 
 FAR_FRAME_BYTES = 380  # maximum bytes of locals addressed by offsets (offset limits, isa.md §3.2)
 

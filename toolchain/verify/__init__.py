@@ -23,7 +23,7 @@ from functools import reduce
 from operator import or_
 
 from toolchain.ir.model import Function
-from toolchain.mir.mir import MFunction
+from toolchain.mir.function import MFunction
 from toolchain.verify import flags, form, registers, stack, traces
 from toolchain.verify.error import MachineError
 from toolchain.verify.facts import BlockFacts, collect_facts, key_of

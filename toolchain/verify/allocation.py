@@ -6,7 +6,9 @@ second name. A virtual register that has not been written may be in any register
 
 from __future__ import annotations
 
-from toolchain.mir.mir import FIRST_VIRTUAL, MI, MFunction
+from toolchain.mir.function import MFunction
+from toolchain.mir.instruction import MI
+from toolchain.mir.operands import FIRST_VIRTUAL
 from toolchain.verify.error import fail
 
 Contents = tuple[list[int], int]  # sets of virtual registers: in each of W0-W15; possibly written

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NoReturn
 
-from toolchain.mir.mir import MI
+from toolchain.mir.instruction import MI
 
 
 class MachineError(AssertionError):

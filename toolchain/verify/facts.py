@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from toolchain.mir.mir import MI, MBlock, MFunction
+from toolchain.mir.function import MBlock, MFunction
+from toolchain.mir.instruction import MI
 from toolchain.verify import flags, registers, stack, traces
 
 Key = tuple[object, ...]

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from toolchain.mir.mir import CC_INVERSE, READS_FLAGS, MBlock
+from toolchain.mir.function import MBlock
+from toolchain.mir.operations import CC_INVERSE, READS_FLAGS
 from toolchain.verify.error import MachineError, fail
 
 FlagUse = tuple[str, str, str]  # (opcode of the reader, flag, opcode of the writer)

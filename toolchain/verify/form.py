@@ -5,7 +5,10 @@ from __future__ import annotations
 import itertools
 from collections.abc import Collection
 
-from toolchain.mir.mir import FIRST_VIRTUAL, MI, SKIPS, FileRegister, MBlock, Mem, MFunction, covered_count
+from toolchain.mir.function import MBlock, MFunction
+from toolchain.mir.instruction import MI, covered_count
+from toolchain.mir.operands import FIRST_VIRTUAL, FileRegister, Mem
+from toolchain.mir.operations import SKIPS
 from toolchain.verify.error import fail
 
 TRANSFERS = {"bra", "jump", "jumpr", "brtable", "ret", "tailcall"}

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from toolchain.abi.target import CALLEE_SAVED, SP
+from toolchain.mir.function import MBlock, MFunction
+from toolchain.mir.instruction import MI
 from toolchain.mir.liveness import mask_of, registers_in, solve
-from toolchain.mir.mir import MI, MBlock, Mem, MFunction
+from toolchain.mir.operands import Mem
 from toolchain.verify.error import MachineError
 
 KEPT = mask_of(list(CALLEE_SAVED))

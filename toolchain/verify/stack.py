@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from toolchain.abi.target import SP
-from toolchain.mir.mir import MI, MBlock, Mem, MFunction
+from toolchain.mir.function import MBlock, MFunction
+from toolchain.mir.instruction import MI
+from toolchain.mir.operands import Mem
 from toolchain.verify.error import fail
 
 LINK = 1 << 20  # added to the depth between LNK and ULNK, where dynamic changes of the depth are not tracked

@@ -10,7 +10,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from toolchain.ir.model import Function, Instr
-from toolchain.mir.mir import MEMORY, MI, FileRegister, MBlock, MFunction
+from toolchain.mir.function import MBlock, MFunction
+from toolchain.mir.instruction import MI
+from toolchain.mir.operands import MEMORY, FileRegister
 from toolchain.verify.error import MachineError
 
 TraceEvent = tuple[str, int, str]  # ("r", "w", "call", "asm" or "return"; bytes; address, "" if unknown)

@@ -7,7 +7,10 @@ from collections.abc import Callable
 
 import pytest
 
-from toolchain.mir.mir import MI, SKIPS, FileRegister, Imm, MBlock, Mem, MFunction, Operand
+from toolchain.mir.function import MBlock, MFunction
+from toolchain.mir.instruction import MI
+from toolchain.mir.operands import FileRegister, Imm, Mem, Operand
+from toolchain.mir.operations import SKIPS
 from toolchain.optimise import block_layout, branches, peephole, returns, schedule, tail_merging
 
 WORD = 0xFFFF

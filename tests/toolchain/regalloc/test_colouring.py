@@ -7,7 +7,9 @@ import random
 import pytest
 
 from toolchain.abi.target import ALLOCATABLE, CALLER_SAVED
-from toolchain.mir.mir import FIRST_VIRTUAL, MI, FileRegister, FrameSlot, Imm, MBlock, MFunction
+from toolchain.mir.function import MBlock, MFunction
+from toolchain.mir.instruction import MI
+from toolchain.mir.operands import FIRST_VIRTUAL, FileRegister, FrameSlot, Imm
 from toolchain.regalloc.colouring import allocate
 
 WORD = 0xFFFF

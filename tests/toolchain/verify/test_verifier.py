@@ -10,8 +10,10 @@ import pytest
 from tests.toolchain.compiled import llvm
 from toolchain.driver import pipeline
 from toolchain.ir.read import read_module
+from toolchain.mir.function import MBlock, MFunction
+from toolchain.mir.instruction import MI
 from toolchain.mir.liveness import summary
-from toolchain.mir.mir import MI, FileRegister, Imm, MBlock, Mem, MFunction
+from toolchain.mir.operands import FileRegister, Imm, Mem
 from toolchain.regalloc import colouring
 from toolchain.verify import MachineError
 from toolchain.verify.registers import undefined_at_entry
