@@ -51,7 +51,7 @@ static void log_change(struct avr *m, u32 address, u32 value, u64 at)
         m->deadline = 0; // the caller empties the log
 }
 
-// An event moves the deadline only forward; `reschedule` recomputes it.
+// Set the due cycle of an event. The next due cycle can only become earlier here; `find_next_due` recomputes it.
 static void schedule(struct avr *m, u32 event, u64 at)
 {
     m->due[event] = at;
@@ -59,7 +59,7 @@ static void schedule(struct avr *m, u32 event, u64 at)
         m->next_due = at;
 }
 
-// The stack grows down to address `at`. Farther below than a large frame it is another stack, of a thread.
+// Record that a push has written address `at`. An address far below the previous ones belongs to the stack of a thread.
 static inline void note_stack(struct avr *m, u32 at, u32 pc, u64 cycle)
 {
     if (at >= m->stack_low || at + LARGE_FRAME < m->stack_low)

@@ -12,7 +12,7 @@ static u32 flash_word(const struct avr *m, u32 pc)
     return m->flash[2 * (pc & PC_MASK)] | (u32)m->flash[2 * (pc & PC_MASK) + 1] << 8;
 }
 
-// The target of a JMP or RJMP; -1: another instruction.
+// Return the target of a JMP or RJMP at `pc`, or -1 for another instruction.
 static int jump_target(const struct avr *m, u32 pc)
 {
     u32 word = flash_word(m, pc);
@@ -21,7 +21,8 @@ static int jump_target(const struct avr *m, u32 pc)
     return word >> 12 == 0xC ? (int)((pc + 1 + (word & 0xFFF) - (word >> 11 & 1 ? 0x1000 : 0)) & PC_MASK) : -1;
 }
 
-// Whether the program has no handler for a vector: it leads to code that jumps to the start, as other vectors do.
+// Whether the program has no handler for a vector. avr-gcc then lets it jump to the same code as the other unused
+// vectors, which jumps to the reset vector.
 static int is_unhandled(const struct avr *m, u32 base, u32 vector)
 {
     int target = jump_target(m, base + 2 * vector);
@@ -56,7 +57,7 @@ static void enter_interrupt(struct avr *m, u32 pending)
     acknowledge(m, vector);
 }
 
-// Whether an event can wake the CPU or end its loop. With interrupts off only a reset can.
+// Whether an event can wake the CPU or end a jump to itself. With interrupts off, only a watchdog reset can.
 static int can_continue(const struct avr *m)
 {
     if (m->data[SREG_AT] & FLAG_I)
@@ -70,7 +71,7 @@ static void halt(struct avr *m)
     m->halted_at = m->cycle;
 }
 
-// Pass the time of a sleeping CPU. Return 0 if the run ends.
+// Wake the sleeping CPU, or advance to the next event that may wake it. Return 0 if nothing can.
 static int sleep_on(struct avr *m)
 {
     u64 from = m->cycle;
@@ -93,7 +94,7 @@ static int sleep_on(struct avr *m)
 static int boundary(struct avr *m)
 {
     for (;;) {
-        m->deadline = m->until; // until then nothing asks for an early return
+        m->deadline = m->until; // withdraws earlier requests to leave the interpreter's loop
         if (m->fault || m->cycle >= m->until || m->halted || m->program_changed || m->light_changed ||
             m->log_count >= LOG_ROOM / 2)
             return 0;

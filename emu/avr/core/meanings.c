@@ -1,4 +1,4 @@
-// Vocabulary of the meanings of the instruction table (isa/rows.py): results with their flags, and macros.
+// Functions and macros that the meanings in the instruction table (isa/rows.py) use: results, flags and accesses.
 
 enum { SREG_BITS = FLAG_S | FLAG_V | FLAG_N | FLAG_Z | FLAG_C };
 
@@ -260,7 +260,7 @@ static inline u16 word_difference(u8 *s, u32 a, u32 b)
         program_flash(m, (u32)(insn - code)); \
         RESUME(); \
     } while (0)
-#define BREAK() (void)0 // without a debugger it does nothing
+#define BREAK() (void)0 // the chip ignores it unless a hardware debugger is connected
 
 #define START(words, cycles) \
     enum { ACCESS = (cycles) - 1 }; \

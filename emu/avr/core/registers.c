@@ -104,7 +104,7 @@ static u32 pending_vectors(const struct avr *m)
     return found;
 }
 
-// Clear the flag of an interrupt that is served. The flags of UART data, EEPROM and flash stay.
+// Clear the flag of an interrupt when the CPU enters it. The conditions of UART data, EEPROM and flash persist.
 static void acknowledge(struct avr *m, u32 vector)
 {
     switch (vector) {
@@ -149,10 +149,10 @@ static void acknowledge(struct avr *m, u32 vector)
     case V_COMPARATOR:
         set_bit(m, ACSR, ACI, 0);
     }
-    timers_schedule(m); // a flag that is set again is an event again
+    timers_schedule(m); // a timer posts no event for a flag that is already set
 }
 
-// After a change of registers: when must the interpreter leave its loop?
+// Recompute the cycle at which the interpreter must leave its loop, after a change of registers.
 static void reschedule(struct avr *m)
 {
     find_next_due(m);
@@ -169,7 +169,7 @@ static int is_unmodelled(u32 address, u32 value)
            (address == ASSR && value & 0x60) || (address == CLKPR && value & 0x0F);
 }
 
-// Whether a read gives the same value until the next event and changes nothing.
+// Whether a read has no side effect and returns the same value until the next event.
 static int is_steady(u32 address)
 {
     switch (address) {
@@ -356,7 +356,7 @@ static void io_write(struct avr *m, u32 address, u32 value)
     reschedule(m);
 }
 
-// SBI and CBI write one bit only; elsewhere flags that a one clears would be lost.
+// Execute SBI or CBI, which write one bit. Writing the other flags of such a register back would clear them.
 static void io_set_bit(struct avr *m, u32 address, u32 bit, u32 on)
 {
     u32 value = m->data[address], flag = 1u << bit;

@@ -8,8 +8,8 @@ static u32 row_of(u32 word)
     return OP_ILLEGAL;
 }
 
-// Decode words `first` to `last` of the flash of `m` into `code`, which has an entry per word, two behind the end, and
-// one for the operation at address 0: there the program starts, and a jump to it is reported.
+// Decode words `first` to `last` of the flash of `m` into `code`. It has an entry per word, two after the end of flash,
+// and one for the instruction at address 0: OP_RESTART replaces it, because it must report jumps to the reset vector.
 void avr_decode(const struct avr *m, struct insn *code, i64 first, i64 last)
 {
     for (u32 pc = (u32)first; pc <= (u32)last; pc++) {
@@ -25,7 +25,7 @@ void avr_decode(const struct avr *m, struct insn *code, i64 first, i64 last)
             code[pc].op = OP_COUNT_DOWN;
     for (u32 n = 1; n <= 2; n++)
         code[PC_MASK + n] = (struct insn){.op = OP_END, .words = 1};
-    int ends = code[0].op == OP_RJMP && code[0].k == 0; // a program that is nothing but its end
+    int ends = code[0].op == OP_RJMP && code[0].k == 0; // the whole program is a jump to itself
     if (!first && !ends)
         code[PC_MASK + 3].op = code[0].op, code[0].op = OP_RESTART;
 }
@@ -44,8 +44,8 @@ void avr_power_on(struct avr *m)
     find_next_due(m);
 }
 
-// Add an input at cycle `at`. Return 0, or -1 if there is no room. Inputs of the past come at once. A second voltage of
-// a channel at the same cycle replaces the first, so they need no more room than one at a machine that does not run.
+// Add an input at cycle `at`. Return 0, or -1 if there is no room. Inputs with a past cycle take effect immediately. A
+// second voltage of a channel at the same cycle replaces the first: a paused machine accepts any number of them.
 i64 avr_input(struct avr *m, u64 at, i64 kind, i64 value)
 {
     u32 last = (m->input_first + m->input_count + INPUT_ROOM - 1) % INPUT_ROOM;

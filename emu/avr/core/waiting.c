@@ -1,6 +1,6 @@
-// Loops that only wait: the time that they pass is added without executing their rounds.
+// Waiting loops: the interpreter adds the cycles of many iterations instead of executing them.
 
-// A jump to itself. Without a wake-up source the program has ended; otherwise it repeats up to the next event.
+// Advance a jump to itself to the next event. If no event can end the loop, the program has ended.
 static void loop_on_itself(struct avr *m)
 {
     u32 cycles = m->looping;
@@ -22,7 +22,7 @@ static void loop_on_itself(struct avr *m)
 
 // A loop that only counts registers down: SBIW, DEC or SUBI with SBCI, and BRNE back to it.
 struct countdown {
-    u64 cycles; // of a round
+    u64 cycles; // of an iteration
     u32 bytes;  // of the counter
     u32 is_word; // counted by SBIW
     u8 registers[4];
@@ -61,8 +61,8 @@ static int is_countdown(const struct insn *code, u32 pc)
     return 1;
 }
 
-// At `cycle` the branch of a countdown is taken. Pass as many rounds as end before `deadline`, and leave one.
-// Return the cycles that pass.
+// Skip the iterations of a countdown that end before `deadline`, except the last one, which the interpreter executes.
+// The branch at its end is taken at `cycle`. Return the cycles that were skipped.
 static u64 count_down(struct avr *m, u8 *s, const struct countdown *c, u64 cycle, u64 deadline)
 {
     u8 *const data = m->data;
@@ -91,7 +91,8 @@ static u64 count_down(struct avr *m, u8 *s, const struct countdown *c, u64 cycle
 
 enum { TRACE_LEAST = 1000, TRACE_WINDOW = 256, TRACE_MOST = 16384, TRACE_PAUSE = 16384, TRACE_PAUSES = 8 };
 
-// Windows and pauses of the search count the cycles that are executed one by one.
+// Return the cycles that were neither skipped nor slept. Windows and pauses of the search count these cycles, because
+// they cost host time.
 static u64 executed(const struct avr *m, u64 cycle)
 {
     return cycle - m->skipped - m->slept;
@@ -104,7 +105,7 @@ static void anchor(struct avr *m, u64 cycle, u32 pc)
     __builtin_memcpy(m->trace_data, m->data, DATA_BYTES);
 }
 
-// Before a stretch without events: should the interpreter look for a round that repeats?
+// Whether the interpreter should look for a round that repeats. The search starts only if no event is due soon.
 static int traces(struct avr *m)
 {
     if (m->tracing)
@@ -116,7 +117,8 @@ static int traces(struct avr *m)
     return 1;
 }
 
-// At the anchor again, or its window is over. Return 1 to continue the search.
+// Compare the state with that at the anchor; at the end of the window, move the anchor or pause the search. Return 1 if
+// the search continues.
 static int trace_on(struct avr *m, u64 cycle, u32 pc)
 {
     if (pc == m->trace_pc && !m->touched && !__builtin_memcmp(m->trace_data, m->data, DATA_BYTES)) {

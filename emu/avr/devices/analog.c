@@ -1,6 +1,6 @@
 // Analog-to-digital converter and analog comparator (data sheet, chapters of these names).
 //
-// The board gives the voltages of the inputs. A conversion takes the voltage of its sampling time.
+// The board sets the voltages of the inputs. A conversion uses the voltage at its sampling time.
 
 enum { ADEN = 7, ADSC = 6, ADATE = 5, ADIF = 4, ADIE = 3 };             // ADCSRA
 enum { ACME = 6 };                                                      // ADCSRB
@@ -29,7 +29,7 @@ static u32 converted(struct avr *m, u32 channel)
     return counts > 1023 ? 1023 : (u32)counts;
 }
 
-// Start a conversion at `start`; `half_clocks`: ADC half-cycles to the sample and to the result.
+// Start a conversion at cycle `start`. `sample` and `result` are the half-periods of the ADC clock until both.
 static void convert(struct avr *m, u64 start, u32 sample, u32 result)
 {
     u32 shift = adc_shift(m);
@@ -42,7 +42,7 @@ static void convert(struct avr *m, u64 start, u32 sample, u32 result)
     schedule(m, EVENT_ADC_DONE, start + (((u64)result << shift) >> 1));
 }
 
-// A rising edge of trigger source `source` (ADTS).
+// Handle a rising edge of trigger source `source` (ADTS): start a conversion if the program has selected it.
 static void start_conversion_by(struct avr *m, u32 source, u64 at)
 {
     if (!bit_of(m, ADCSRA, ADEN) || !bit_of(m, ADCSRA, ADATE) || (m->data[ADCSRB] & 7u) != source)
@@ -112,7 +112,7 @@ static void comparator_edge(struct avr *m, int rising, u64 at)
         timer_capture(m, at);
 }
 
-// Compare the inputs again. The synchroniser's one or two cycles are part of the board's delay.
+// Compare the inputs after one has changed. The board's delay includes the synchroniser's one or two cycles.
 static void comparator_update(struct avr *m, u64 at)
 {
     if (bit_of(m, ACSR, ACD))

@@ -64,7 +64,7 @@ static void erase_page_buffer(struct avr *m)
         m->page[n] = 0xFF, m->spm_latched[n] = 0;
 }
 
-// SPM, executed at word address `pc`. Outside the boot section it does nothing.
+// Execute SPM at word address `pc`. Outside the boot section it has no effect.
 static void program_flash(struct avr *m, u32 pc)
 {
     u32 command = m->data[SPMCSR] & 0x3F, z = word_at(m, 30), start = z & (FLASH_BYTES - PAGE_BYTES);
@@ -102,7 +102,7 @@ static void flash_done(struct avr *m)
     m->data[SPMCSR] &= 0xC0;
 }
 
-// LPM while SPMCSR selects the signature row or the lock and fuse bits.
+// Return the byte that LPM reads while SPMCSR selects the signature row or the lock and fuse bits.
 static u32 special_row(struct avr *m, u32 z)
 {
     static const u8 signature[] = {0x1E, 0xFF, 0x95, 0xFF, 0x0F};

@@ -14,7 +14,7 @@ static void external_interrupt(struct avr *m, u32 n, int rising)
         m->data[EIFR] |= (u8)(1 << n);
 }
 
-// Levels of a port may have changed at cycle `at`.
+// Recompute the levels of a port at cycle `at`, and pass changes to the interrupts and timers.
 static void port_update(struct avr *m, u32 port, u64 at)
 {
     u32 now = levels_of(m, port), changed = now ^ m->pin_now[port];
@@ -35,7 +35,7 @@ static void port_update(struct avr *m, u32 port, u64 at)
     }
 }
 
-// The synchroniser of a pin is one cycle late.
+// Return the levels that the program reads: the synchroniser shows a change one cycle late.
 static u32 port_read(struct avr *m, u32 port)
 {
     if (m->cycle > m->pin_changed[port] || !m->pin_changed[port])

@@ -4,7 +4,7 @@ enum { WDIF = 7, WDIE = 6, WDCE = 4, WDE = 3 }; // WDTCSR
 enum { IDLE, ADC_NOISE_REDUCTION, POWER_DOWN, POWER_SAVE, STANDBY = 6, EXTENDED_STANDBY };
 enum { WDRF = 3, WAKE_CYCLES = 4, START_UP_CYCLES = 6 };
 
-// Half-periods of the watchdog's 128 kHz oscillator in cycles of the 8 MHz CPU clock: 62.5 cycles a period.
+// Return the watchdog's time-out in CPU cycles. A period of its 128 kHz oscillator takes 62.5 cycles at 8 MHz.
 static u64 watchdog_cycles(const struct avr *m)
 {
     u32 select = (m->data[WDTCSR] & 7) | (m->data[WDTCSR] >> 2 & 8);
@@ -57,7 +57,7 @@ static void io_clock_runs(struct avr *m, u64 at)
     timers_schedule(m);
 }
 
-// The sleep instruction.
+// Execute SLEEP: stop the clocks of the selected mode.
 static void fall_asleep(struct avr *m, u64 at)
 {
     u32 mode = m->data[SMCR] >> 1 & 7;

@@ -36,7 +36,7 @@ static struct waveform waveform_of(const struct avr *m, u32 n)
     return (struct waveform){kinds16[mode], top, 0xFFFF};
 }
 
-// Clock cycles of a tick as a power of two; -1: the timer is stopped.
+// Return the binary logarithm of the CPU cycles of a tick, or -1 if the timer is stopped.
 static int tick_shift(const struct avr *m, u32 n)
 {
     u32 select = m->data[control[n] + 1] & 7;
@@ -51,7 +51,7 @@ static u64 ticks_until(const struct avr *m, u32 n, int shift, u64 at)
     return (at - m->prescaler_start[n == 2]) >> shift;
 }
 
-// The count at which a dual-slope timer turns or has turned.
+// Return the count at which a dual-slope timer turns or has turned.
 static u32 turn_of(const struct avr *m, u32 n, const struct waveform *w)
 {
     return m->timer_turn[n] ? m->timer_turn[n] : w->top ? w->top : 1;
@@ -145,7 +145,7 @@ static void count_ticks(struct avr *m, u32 n, u64 ticks, u64 first, int shift)
         int same_top = w.kind < PHASE_PWM || turn_of(m, n, &w) == w.top;
         int settled = same_top && m->timer_position[n] < period && m->timer_compare[2 * n] == m->timer_buffer[2 * n] &&
                       m->timer_compare[2 * n + 1] == m->timer_buffer[2 * n + 1];
-        if (settled && ticks > 3 * period) { // the last two periods set all flags
+        if (settled && ticks > 3 * period) { // skip whole periods: the two that remain set the same flags
             u64 whole = (ticks - 2 * period) / period * period;
             ticks -= whole, done += whole;
             m->timer_blocked[n] = 0;
@@ -162,7 +162,7 @@ static void count_ticks(struct avr *m, u32 n, u64 ticks, u64 first, int shift)
     }
 }
 
-// Bring a timer to cycle `at`.
+// Advance a timer to cycle `at`: its count and its flags.
 static void timer_sync(struct avr *m, u32 n, u64 at)
 {
     int shift = tick_shift(m, n);
@@ -186,7 +186,7 @@ static u32 wanted_flags(const struct avr *m, u32 n)
     return wanted & (OVERFLOW | COMPARE_A | COMPARE_B) & ~(u32)m->data[TIFR0 + n];
 }
 
-// Schedule the next point at which a flag that matters is set.
+// Post the event at which the timer next sets a flag that an interrupt or the ADC waits for.
 static void timer_schedule(struct avr *m, u32 n)
 {
     int shift = tick_shift(m, n);
@@ -210,7 +210,7 @@ static void timer_schedule(struct avr *m, u32 n)
         m->timer_blocked[n] = 0;
         move_to(m, n, &next);
     }
-    m->timer_position[n] = position, m->timer_blocked[n] = (u8)blocked; // the search changes nothing
+    m->timer_position[n] = position, m->timer_blocked[n] = (u8)blocked; // the search must leave the timer unchanged
     m->timer_turn[n] = turn;
     m->timer_compare[2 * n] = compare[0], m->timer_compare[2 * n + 1] = compare[1];
 }
@@ -240,7 +240,7 @@ static void set_count(struct avr *m, u32 n, u32 value)
     m->timer_blocked[n] = 1;
 }
 
-// In the PWM modes a written compare value waits for the end of the period.
+// Write a compare value. In the PWM modes it takes effect at the end of the period.
 static void set_compare(struct avr *m, u32 n, u32 channel, u32 value)
 {
     m->timer_buffer[2 * n + channel] = (u16)value;
@@ -248,7 +248,7 @@ static void set_compare(struct avr *m, u32 n, u32 channel, u32 value)
         m->timer_compare[2 * n + channel] = (u16)value;
 }
 
-// A change of the control registers: the count stays, and a mode without buffer takes the compare values at once.
+// Write a control register. The count stays; a mode without buffer uses the written compare values at once.
 static void set_control(struct avr *m, u32 n, u32 address, u32 value)
 {
     struct waveform before = waveform_of(m, n);
@@ -262,7 +262,7 @@ static void set_control(struct avr *m, u32 n, u32 address, u32 value)
             m->timer_compare[2 * n + c] = m->timer_buffer[2 * n + c];
 }
 
-// The capture unit's event: an edge of the comparator or of pin ICP1.
+// Capture the count of timer 1, at an edge of the comparator or of pin ICP1.
 static void timer_capture(struct avr *m, u64 at)
 {
     timer_sync(m, 1, at);
@@ -272,7 +272,7 @@ static void timer_capture(struct avr *m, u64 at)
     m->data[TIFR1] |= CAPTURE;
 }
 
-// An edge of pin T0 or T1, for timers that count edges.
+// Count an edge of pin T0 or T1, if the timer counts edges of this direction.
 static void timer_edge(struct avr *m, u32 n, int rising, u64 at)
 {
     if ((m->data[control[n] + 1] & 7) == (rising ? 7 : 6) && !(m->data[PRR] >> power_bits[n] & 1))
@@ -300,7 +300,7 @@ static u32 timer_read(struct avr *m, u32 address)
     }
 }
 
-// A dual-slope timer whose count is at TOP or above it counts down.
+// Let a dual-slope timer count down if its count is TOP or above.
 static void turn_at_top(struct avr *m, u32 n)
 {
     struct waveform w = waveform_of(m, n);
@@ -352,7 +352,7 @@ static void timer_write(struct avr *m, u32 address, u32 value)
     }
 }
 
-// GTCCR: reset the prescalers.
+// Write GTCCR, which resets the prescalers.
 static void prescaler_write(struct avr *m, u32 value, u64 at)
 {
     for (u32 p = 0; p < 2; p++)

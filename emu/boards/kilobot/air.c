@@ -1,15 +1,16 @@
 // Infrared light between Kilobots: edges of emitters reach the receivers' comparators and converters.
 //
 // Time is counted in ticks of 1/8 MHz since the start of the swarm; each robot has its own clock rate. Light reaches
-// other robots `delay` ticks after the emitter's pin, the robot itself (its echo) ECHO ticks after it. A robot runs only as
-// far as no other robot can have sent light before, so light is never late and a run does not depend on how it is cut.
+// other robots `delay` ticks after the emitter's pin, and the sender itself (its echo) after ECHO ticks. A robot never
+// runs past a tick at which light may still arrive. So no light is late, and the division of a run into calls has no
+// effect.
 
 typedef i64 (*run_function)(struct avr *m, const struct insn *code, u64 until);
 typedef i64 (*input_function)(struct avr *m, u64 at, i64 kind, i64 value);
 
-// MARGIN: an instruction may end so many ticks behind the goal of its robot; light up to there is known.
+// MARGIN: ticks by which the last instruction may pass the goal of a robot; all light until then must be known.
 enum { ECHO = 9, MARGIN = 8 };
-enum { LAMP = 0xFFFFFFFF }; // sender of light that no robot sends
+enum { LAMP = 0xFFFFFFFF }; // sender of light from outside the swarm
 enum { INPUT_ANALOG = 2, CH_HIGH_GAIN = 0, CH_LOW_GAIN = 1, CH_AIN0 = 9 };
 enum { RUN_LIMIT, RUN_FAULT, RUN_HALT, RUN_LOG, RUN_PROGRAM, RUN_LIGHT }; // results of avr_run
 enum { LIT_UV = 1000000, DARK_UV = 0 };
@@ -19,13 +20,13 @@ struct edge {
     u64 at; // ticks
     u32 high_uv, low_uv;
     i32 change; // +1: an emitter is switched on, -1: off
-    u32 sender; // orders edges of one tick
+    u32 sender; // decides the order of edges of one tick
 };
 
-struct link { // what a receiver gets of a sender
+struct link { // light of a sender at a receiver
     u32 high_uv, low_uv;
     u32 loss;   // of 65,536 pulses
-    u32 shown;  // the receiver got the light of an emitter that is still on
+    u32 shown;  // 1: the receiver sees an emitter of the sender that is still on
 };
 
 struct robot {
@@ -44,14 +45,14 @@ struct air {
     i64 count;
     struct robot *robots;
     struct link *links; // [sender][receiver]
-    u64 *acts;          // when each robot can send light at the earliest
+    u64 *acts;          // earliest tick at which each robot can send light
     run_function run;
     input_function input;
     u64 delay, seed, room;
     u64 lost_edges; // edges for which a receiver had no room
 };
 
-// A random number for a pulse of a sender at a receiver: the order in which robots run does not matter.
+// Return a random number for a pulse on a link. It depends only on its arguments, not on the order in which robots run.
 static u32 draw(const struct air *a, u64 link, u64 pulse)
 {
     u64 z = a->seed + link * 0x9E3779B97F4A7C15ULL + pulse * 0xD1B54A32D192ED03ULL;
@@ -60,12 +61,13 @@ static u32 draw(const struct air *a, u64 link, u64 pulse)
     return (u32)((z ^ z >> 31) >> 32);
 }
 
-// The robot's cycle at a tick, and the first tick at or after a cycle.
+// Return the robot's cycle at a tick.
 static u64 cycle_at(const struct robot *r, u64 tick)
 {
     return tick <= r->on_at ? 0 : (u64)((unsigned __int128)(tick - r->on_at) * r->rate >> 32);
 }
 
+// Return the first tick at or after a cycle of the robot.
 static u64 tick_of(const struct robot *r, u64 cycle)
 {
     u64 tick = r->on_at + (u64)((unsigned __int128)cycle * r->period >> 32);
@@ -74,7 +76,8 @@ static u64 tick_of(const struct robot *r, u64 cycle)
     return tick;
 }
 
-// When the robot can send light at the earliest: a waiting one at its next event or at the end of its countdown.
+// Return the earliest tick at which the robot can send light. A robot in a waiting loop cannot before its next event or
+// the end of its countdown.
 static u64 acts_at(const struct robot *r)
 {
     const struct avr *m = r->avr;
@@ -98,7 +101,7 @@ static int is_before(const struct edge *e, const struct edge *other)
     return e->at != other->at ? e->at < other->at : e->sender < other->sender;
 }
 
-// Return whether the robot receives the edge: one that is stopped or has no power yet does not.
+// Queue an edge for a robot. Return whether the robot receives it: a stopped robot, or one without power yet, does not.
 static int add_edge(struct air *a, struct robot *r, struct edge edge)
 {
     if (edge.at < r->reached)
@@ -117,8 +120,8 @@ static int add_edge(struct air *a, struct robot *r, struct edge edge)
     return 1;
 }
 
-// Give the edges up to tick `until` to the robot's inputs, those of one tick together. The comparator sees light or
-// darkness; strength stays.
+// Apply the edges up to tick `until` to the robot's inputs, those of one tick together. The comparator's input is light
+// or darkness. The converter's inputs keep the strength, because a conversion samples after the end of the pulse.
 static void deliver(struct air *a, struct robot *r, u64 until)
 {
     u32 done = 0;
@@ -146,7 +149,7 @@ static void deliver(struct air *a, struct robot *r, u64 until)
     r->edge_count -= done;
 }
 
-// A robot's emitter goes on (+1) or off (-1) at a tick. Return whether another robot receives that.
+// Switch a robot's emitter on (+1) or off (-1) at a tick. Return whether another robot receives the change.
 static int emit(struct air *a, i64 sender, u64 at, i32 change)
 {
     struct robot *s = a->robots + sender;
@@ -155,7 +158,7 @@ static int emit(struct air *a, i64 sender, u64 at, i32 change)
     for (i64 n = 0; n < a->count; n++) {
         struct link *l = a->links + sender * a->count + n;
         if (change < 0 ? !l->shown : !l->high_uv && !l->low_uv)
-            continue; // light that was received ends, however far the sender is by then
+            continue; // the receiver also sees the end of the light if the sender has moved out of reach meanwhile
         if (change > 0 && l->loss && (draw(a, (u64)(sender * a->count + n), s->pulses) & 0xFFFF) < l->loss)
             continue;
         struct edge edge = {at + (n == sender ? ECHO : a->delay), l->high_uv, l->low_uv, change, (u32)sender};
@@ -165,7 +168,7 @@ static int emit(struct air *a, i64 sender, u64 at, i32 change)
     return received;
 }
 
-// Stop a robot for good: its light goes out, and it receives no more.
+// Stop a robot permanently: switch its light off, and deliver no more light to it.
 void air_stop(struct air *a, i64 index)
 {
     struct robot *r = a->robots + index;
@@ -175,7 +178,7 @@ void air_stop(struct air *a, i64 index)
     r->reached = STOPPED;
 }
 
-// Light at one robot that no robot has sent: from tick `at` for `ticks`.
+// Show one robot light from outside the swarm, from tick `at` for `ticks`.
 void air_flash(struct air *a, i64 receiver, i64 at, i64 ticks, i64 high_uv, i64 low_uv)
 {
     struct edge on = {(u64)at, (u32)high_uv, (u32)low_uv, 1, LAMP}, off = on;
@@ -184,7 +187,8 @@ void air_flash(struct air *a, i64 receiver, i64 at, i64 ticks, i64 high_uv, i64 
         add_edge(a, a->robots + receiver, off);
 }
 
-// Run one robot to tick `goal`, or as far as no answer to its own light can arrive. Return 0, or 1 if Python must handle its state (fault, log, new program).
+// Run one robot to tick `goal`; if it sends light, only until an answer to that light can arrive. Return 0, or 1 if
+// Python must handle its state (fault, log, new program).
 static int run_robot(struct air *a, i64 index, u64 goal)
 {
     struct robot *r = a->robots + index;
@@ -205,7 +209,7 @@ static int run_robot(struct air *a, i64 index, u64 goal)
             r->reached = reached;
             return 1;
         } else if (reached < piece)
-            reached = piece; // between two cycles
+            reached = piece; // the goal is between two cycles of this robot
         r->reached = reached;
     }
     return 0;
@@ -227,7 +231,8 @@ i64 air_run(struct air *a, i64 until)
         }
         if (first >= end)
             break;
-        // Light that is sent from `first` on arrives behind `horizon`. A robot that acts alone may run farther.
+        // Light that is sent at `first` or later arrives after `horizon`, so every robot may run to it. If only one
+        // robot can send light before the horizon, that robot may run further.
         u64 horizon = first + a->delay - MARGIN, before = horizon, goal = horizon;
         if (second >= horizon)
             before = first + 1, goal = second > end ? end : second + a->delay - MARGIN;
@@ -241,7 +246,7 @@ i64 air_run(struct air *a, i64 until)
                 return n;
         }
     }
-    for (i64 n = 0; n < a->count; n++) // none of them sends light before the end
+    for (i64 n = 0; n < a->count; n++) // no robot can send light before the end
         if (run_robot(a, n, end))
             return n;
     return -1;
