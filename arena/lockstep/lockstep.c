@@ -48,7 +48,7 @@ struct robot {
     struct native *native;
     const struct code *code;
     i64 quantum, on_at;
-    i64 quanta_taken, quanta_reported; // quanta whose ends Python has read; whose motor steps the wheels have
+    i64 quanta_taken, quanta_reported; // quanta whose end Python has read; quanta whose motor steps the wheels have
     i64 end;                           // cycle at which native code returns to Python
     i64 probe_at, probes, busy_probes; // CPU probes: cycle of the next one; number; number that found the CPU awake
     i64 stuck_since;                   // cycle since which the firmware may be stuck; -1: it is not

@@ -65,8 +65,8 @@ struct world {
     i64 polygon_count;
 };
 
-// Bodies so near (edge to edge) can touch before the next check. A check is due when a body has come WAY, a third of
-// NEAR. So two of them come nearer by at most two thirds. cm
+// Distances in cm. Bodies whose edges are nearer than NEAR may touch before the next check. A body is checked again
+// after it has moved by WAY, a third of NEAR, so two bodies approach by at most two thirds of NEAR between checks.
 static const f64 NEAR = 3, WAY = 1;
 
 // Steps between two searches for objects that can rest.

@@ -16,10 +16,10 @@
 enum {
     SLOT = 270,
     PER_CYCLE = 243, /* 65,536 / SLOT */
-    LATENCY = 40,    /* cycles from a pulse to the reading of its time */
+    LATENCY = 40,    /* cycles from a pulse until its handler reads the timer */
     HALF_SLOT = 134,
     STOP_SLOT = 9,
-    LEADER = 2420,           /* cycles from the first pulse to the one that ends byte 0, which is dark */
+    LEADER = 2420,           /* cycles from the first pulse to the pulse that ends byte 0, in which no other pulse is */
     BYTE_AFTER_LEADER = 286, /* cycles from a stop pulse to the next start pulse */
     BYTE_AFTER_BYTE = 282,
     GIVE_UP = 2959, /* cycles without a pulse after a start pulse: the frame is lost */
@@ -72,7 +72,7 @@ static int16_t convert(uint8_t channel)
     return counts;
 }
 
-/* The result of the conversion that a pulse has started; it may be over, if another interrupt came first. */
+/* Returns the result of the conversion that a pulse has started; waits until it is over. */
 static int16_t converted(void)
 {
     for (uint8_t tries = 0; tries < 40 && !(ADCSRA & 1 << ADIF); tries++) {
@@ -119,7 +119,7 @@ static void send_byte(uint16_t at, uint8_t byte)
     pulse(at + SLOT);
 }
 
-/* With interrupts off. Returns 0 if another robot sends. */
+/* Sends a message; interrupts are off. Returns 0 if another robot is sending. */
 static uint8_t send(const message_t *m)
 {
     const uint8_t *bytes = (const uint8_t *)m;
@@ -253,7 +253,7 @@ ISR(ANALOG_COMP_vect)
     uint8_t slot = (uint8_t)((uint32_t)(uint16_t)(now - LATENCY - began + HALF_SLOT) * PER_CYCLE >> 16);
     if (slot < STOP_SLOT) {
         if (place < 0 || slot == 0) {
-            listen(); /* light in the dark byte: two robots send */
+            listen(); /* light in byte 0, which is dark: two robots have begun to send */
         } else {
             octet |= (uint8_t)(1 << (slot - 1));
         }
@@ -289,7 +289,7 @@ static int16_t table(uint16_t start, uint8_t n)
     return (int16_t)(eeprom_read_byte(at) << 8 | eeprom_read_byte(at + 1));
 }
 
-/* Returns mm beyond the first entry of a falling table, by linear interpolation, beyond its end by extrapolation. */
+/* Returns the mm by which the distance exceeds that of a falling table's first entry: interpolated, or extrapolated. */
 static int16_t in_table(uint16_t start, int16_t counts)
 {
     uint8_t n = 1;
@@ -364,7 +364,7 @@ uint8_t rand_hard(void)
 {
     uint8_t found = 0;
     for (uint8_t bit = 0; bit < 8; bit++) {
-        for (uint8_t tries = 0; tries < 128; tries++) { /* the first of two different bits is unbiased (von Neumann) */
+        for (uint8_t tries = 0; tries < 128; tries++) { /* of two different bits the first is unbiased (von Neumann) */
             uint8_t one = get_voltage() & 1, two = get_voltage() & 1;
             if (one != two) {
                 found |= (uint8_t)(one << bit);
@@ -406,7 +406,7 @@ void kilo_init(void)
 
 EMPTY_INTERRUPT(WDT_vect)
 
-/* Eight seconds of power-down, then 12 ms of listening. */
+/* Sleeps for eight seconds in power-down mode, then listens for 12 ms. */
 static void doze(void)
 {
     set_color(0);

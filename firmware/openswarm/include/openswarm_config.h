@@ -45,7 +45,7 @@
 #endif
 
 #ifndef SYS_SMALL_PAYLOAD
-#define SYS_SMALL_PAYLOAD (17u * HEAP_STEP) /* maximum from an ISR */
+#define SYS_SMALL_PAYLOAD (17u * HEAP_STEP) /* largest payload that an ISR may send */
 #endif
 
 #define HEAP_STEP sizeof(void *) /* granularity of allocations */

@@ -112,7 +112,7 @@ static HAL_OUTLINE bool write_message(uint8 uart, const void *message, uint16 si
     building.taken = 0;
     building.error = SYS_ERROR_ARGUMENT;
     building.limit = (uint16)(SYS_UART_TX - HAL_LOAD(c->taken));
-    bool sound = c->encode(message, size, put) && building.to == c; /* false if the processor wrote to a UART */
+    bool sound = c->encode(message, size, put) && building.to == c; /* false also if the processor wrote to a UART */
     building.to = NULL;
     hal_lock_state lock = hal_lock_devices();
     if (!sound) {

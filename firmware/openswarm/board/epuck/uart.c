@@ -42,7 +42,7 @@ void hal_uart_start(uint8_t uart)
     }
 }
 
-/* The transmit interrupt is enabled while there is something to send; setting its flag makes it run at once. */
+/* Enables the transmit interrupt, which stays enabled while bytes wait, and requests it, so that it runs at once. */
 void hal_uart_transmit(uint8_t uart)
 {
     if (uart == SYS_UART1) {
@@ -55,7 +55,7 @@ void hal_uart_transmit(uint8_t uart)
     }
 }
 
-/* Fills the FIFO; 1: nothing was left to send. */
+/* Fills the FIFO; returns 1 if the queue became empty. */
 BOUNDS_AT("while (", loop 5); /* four places, and the byte that leaves meanwhile */
 static HAL_OUTLINE uint16 fill(uint8 uart)
 {

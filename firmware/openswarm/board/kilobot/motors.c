@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: MIT */
 /* Vibration motors of the Kilobot: T2, phase-correct PWM with prescaler 8 on OC2A and OC2B, as kilolib drives them.
  *
- * A Kilobot slides; it knows no speed. The duty at which it goes straight is calibrated for each robot and kept in
- * EEPROM. Here FULL_MM_S stand for that duty and less for proportionally less, UNVERIFIED on a robot: the paper's
- * controllers then turn and go in the right sense. Backwards there is none. A motor that starts gets SPIN_UP_MS of
- * full duty against static friction (kilolib: 15 ms; never longer than 50). */
+ * A Kilobot slides and measures no speed. The duty at which it goes straight is calibrated for each robot and kept in
+ * EEPROM. The speed FULL_MM_S selects that duty, a lower speed proportionally less, UNVERIFIED on a robot: the paper's
+ * controllers then turn and go in the right direction. It cannot drive backwards. A motor that starts gets SPIN_UP_MS
+ * of full duty against static friction (kilolib: 15 ms; never longer than 50). */
 #include "io.h"
 #include "pins.h"
 

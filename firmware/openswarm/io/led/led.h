@@ -6,7 +6,7 @@
 #include "openswarm.h"
 
 enum {
-    SYS_IO_LED = 0x14, /* [sys_led_order] request, by anyone */
+    SYS_IO_LED = 0x14, /* [sys_led_order] request to switch a LED, from any sender */
     SYS_LED_ALL = 0xFF /* LED number that means all ten */
 };
 
@@ -19,7 +19,7 @@ typedef struct {
 
 /* Receives an order before its execution and may change it; false: the order is dropped. Handler context. */
 typedef bool (*sys_led_processor)(sys_led_order *order);
-sys_led_processor Sys_Set_LEDProcessor(sys_led_processor processor); /* MTH; NULL: orders unchanged */
+sys_led_processor Sys_Set_LEDProcessor(sys_led_processor processor); /* MTH; NULL: LED orders are executed unchanged */
 
 /* M | no | - | 40 | MEMORY.  Between Sys_Init_Kernel and Sys_Start_Kernel. Columns: openswarm.h, top. */
 bool Sys_Start_LEDs(void);

@@ -30,7 +30,7 @@ void Sys_Start_Spreading(uint16 number);
  * again. */
 bool Sys_Spread(uint32 now, uint8 *message);
 void Sys_Hear_Update(uint32 now, const uint8 *message);
-/* false: this robot has no such program whole; or its flag cannot be written, and only the neighbours activate it. */
+/* Activates a version here and on neighbours. false: not stored whole here, or only neighbours could activate it. */
 bool Sys_Offer_Activation(uint16 version);
 /* Version of the newest whole program of this robot, or 0, and whether it is activated. */
 uint16 Sys_Get_StoredVersion(bool *is_active);

@@ -6,9 +6,9 @@
 enum {
     WORDS = 5,
     PARTS = 4,
-    BLOCK = 2 * PARTS, /* parts of a block */
+    BLOCK = 2 * PARTS, /* 16-bit parts of a block */
     INITIAL = 0xF0,    /* constant of the first of twelve rounds */
-    ABSORBING = 0xB4,  /* of the first of eight */
+    ABSORBING = 0xB4,  /* constant of the first of eight */
     STEP = 0x0F,
     LAST = 0x4B,
     PADDING = 0x01,

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 ; Context switch, idle and entry of interrupts to the kernel stack, for avr-gcc's assembler. Interrupts do not nest.
 ;
-; A thread that does not run has on its stack, from the top: what brought it here, then what leave_thread saved.
+; The stack of a thread that does not run, from the top: what preemption or a yield stored, then what leave_thread saved.
 ;     preempted  PC, r30, r31, SREG, r24, r25, r0, r1, r18-r23, r26, r27   17 bytes
 ;     yielded    PC                                          2 bytes
 ;     both       return into the above, r2-r17, r28, r29    20 bytes; sp points below
@@ -82,14 +82,14 @@ cpu_open:
         sbi     GPIOR0, OPEN
         sbis    GPIOR0, DUE
         ret
-        brie    take_due                ; otherwise the exit of the interrupt will see it
+        brie    take_due                ; in an interrupt, its exit takes the slice end
         ret
 
 ; ---- Saves the running thread, runs Z on the kernel stack, resumes the thread it returns; level slice ------------
-; The library's own prologue and epilogue of functions (-mcall-prologues) push and pop r2-r17, r28 and r29: Z = where the first
-; continues with Y = SP, r30 = bytes that the second frees above Y.
+; libgcc's prologue and epilogue (-mcall-prologues) push and pop r2-r17, r28 and r29. The prologue continues at Z with
+; Y = SP; the epilogue frees r30 bytes above Y.
 leave_thread:
-        cbi     GPIOR0, FORCED          ; the request is served: else a superfluous one would come again for ever
+        cbi     GPIOR0, FORCED          ; else a request that needs no switch would be repeated for ever
         movw    r22, r30
         ldi     r26, 0
         ldi     r27, 0

@@ -9,7 +9,7 @@
 #include "registers.h"
 
 #define HAL_STACK_GROWS_DOWN
-#define HAL_STACK_IS_TAKEN /* the guard of the last thread */
+#define HAL_STACK_IS_TAKEN /* hal_stack_release() disables the thread's guard */
 #define HAL_WORD_IS_ONE_ACT 1
 
 typedef uint32_t hal_lock_state; /* BASEPRI */

@@ -37,7 +37,7 @@ PendSV_Handler:
         ldr     r3, =cpu_pick
         ldr     r1, [r3]
         cbnz    r1, picked
-        ldr     r3, =cpu_forced         @ the request is served: else a superfluous one would come again for ever
+        ldr     r3, =cpu_forced         @ else a request that needs no switch would be repeated for ever
         strb    r1, [r3]
         mov     r0, r2
         bl      os_slice_end
@@ -67,11 +67,11 @@ overflow:
         movs    r2, #0
         b       os_trap
 #else
-        @ nothing of the thread is needed any more
+        @ the thread ends, so its registers are not saved
         ldr     r3, =cpu_pick
         movs    r0, #0
         str     r0, [r3]
-        ldr     r3, =FPU_FPCCR_ADDRESS  @ the hardware shall not store s0-s15 there either
+        ldr     r3, =FPU_FPCCR_ADDRESS  @ prevents the hardware from storing s0-s15 on its stack
         ldr     r0, [r3]
         bic     r0, r0, #1
         str     r0, [r3]

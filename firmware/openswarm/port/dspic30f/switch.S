@@ -84,7 +84,7 @@ _hal_block:
 
 ; ---- void hal_yield(void): thread stack, IPL 0 ---------------------------------------------------------------------
 _hal_yield:
-        bset    SR, #5                  ; IPL 1; an interrupt that slips in finds nothing half-done
+        bset    SR, #5                  ; IPL 1; an interrupt before it takes effect finds a consistent state
         mov     #handle(_os_yield), w1
 1:      push.d  w8
         push.d  w10

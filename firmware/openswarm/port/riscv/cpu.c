@@ -19,7 +19,7 @@ static uint64_t next_tick; /* value of mtime */
 extern uint32_t main_stack_bottom[];
 extern void cpu_start_thread(void);
 
-/* The high word is never smaller in between than before and after. */
+/* Writes the high word as all ones first, so that no intermediate value is earlier than both times. */
 static void set_next_tick(uint64_t moment)
 {
     next_tick = moment;

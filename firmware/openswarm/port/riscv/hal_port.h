@@ -9,7 +9,7 @@
 #define HAL_STACK_GROWS_DOWN
 #define HAL_WORD_IS_ONE_ACT 1
 
-/* What the matching unlock sets again. The compiler knows which bit a lock has, and omits the other test. */
+/* Bits that the matching unlock sets again. The compiler knows which bit a lock cleared, and omits the other test. */
 typedef uint32_t hal_lock_state;
 typedef uint32_t *hal_limit; /* lowest word of the stack */
 

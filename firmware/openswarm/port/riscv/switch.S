@@ -3,7 +3,7 @@
 #
 # A thread that does not run has on its stack, from the top:
 #     preempted  ra, t0-t6, a0-a7                                       64 bytes
-#     every one  s0-s11, where it resumes, what that needs in t0        64 bytes; sp points at s0
+#     always     s0-s11, address of the resuming code, its argument in t0   64 bytes; sp points at s0
 # A stack pointer is always a multiple of 16. The kernel stack is the start of os_memory; it is empty whenever a thread
 # runs. It lies below all other stacks. gp and tp never change.
 #include "openswarm_config.h"
@@ -35,8 +35,8 @@
         \operation a7, 60(sp)
         .endm
 
-# The end of an interrupt: withdraws the reservation of an LR that it came behind, because a store of the same hart may
-# leave it. Should this SC succeed, it stores what is there.
+# End of an interrupt. It cancels the reservation of an interrupted LR, which stores of the same hart may not cancel. If
+# this SC succeeds, it stores the value that memory holds already.
         .macro  return_from_interrupt
         each_scratch lw
         sc.w    zero, ra, (sp)

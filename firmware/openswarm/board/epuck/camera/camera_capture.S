@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
-; Line capture at IPL 6: PUSH.S, no pushes, calls nothing, knows no kernel.
+; Line capture at IPL 6. It saves registers by PUSH.S only and calls no function; independent of the kernel.
 ;
-; The sensor puts byte k of a line on RD8-RD15 from 8 k - 4 to 8 k + 4 Tcy behind the rise of HREF. The first read is the
-; 11th Tcy of the interrupt function, 16-18 Tcy behind HREF, so it takes byte 2, the high byte of pixel 1; the window
+; The sensor puts byte k of a line on RD8-RD15 from 8 k - 4 to 8 k + 4 Tcy after the rise of HREF. The first read is the
+; 11th Tcy of the interrupt function, 16-18 Tcy after HREF, so it takes byte 2, the high byte of pixel 1; the window
 ; begins a pixel early for that (epuck.md §7.5). From there every second pixel is taken: 32 Tcy each. The low byte comes
 ; 8 Tcy after the high one. RCOUNT belongs to the interrupted code and waits in W2.
 #include "camera_sensor.h"

@@ -19,7 +19,7 @@ __update_start:
     mov     #UPDATE_CALLS, w1
     tblrdl  [w1], w0
     mov     #(UPDATE_CALLS_MARK + calls), w1
-    sub     w0, w1, w0                  ; so many more calls are offered than this was made for
+    sub     w0, w1, w0                  ; calls that the firmware offers and this program does not know
     mov     #(0xFF - calls), w1
     cp      w0, w1
     bra     leu, 1f
