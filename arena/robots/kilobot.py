@@ -19,6 +19,8 @@ from arena.scene.loader import FCY, Scene, SceneError
 from arena.scene.robot_kind import STRAIGHT_DUTY, TURN_DUTY, motor_strengths
 from arena.world.physics import STREAM_SENSORS, STREAM_TRAITS, generator
 from arena.world.poses import Poses
+from emu.avr.core.addresses import ADDRESSES
+from emu.avr.core.state import RESTARTED
 from emu.avr.image import AvrImage, load_avr_image
 from emu.avr.machine import HZ, UDR0, Atmega328p, Change
 from emu.boards.kilobot.messages import DATA_SIZE, TYPES, Message, PulseDecoder, frame
@@ -34,6 +36,8 @@ MAX_DUTY: Final = 255
 LINE_LIMIT: Final = 200
 """Bytes after which a line of the debug UART without a line end is cut."""
 _EMITTING: Final = (DDRB, PORTB)
+MAX_VARIABLES: Final = 24
+"""Variables that `KilobotController.inspection` shows."""
 
 
 def controllers(
@@ -153,6 +157,7 @@ class KilobotController:
         self._lines: list[SerialLine] = []
         self._line = bytearray()
         self._line_at = 0
+        self._reset_at = -FCY
         self._reported = (0, 0)
 
     def control_step(self, tick: int, poses: Poses) -> tuple[float, float]:
@@ -188,8 +193,12 @@ class KilobotController:
         if change.register == UDR0:
             self._take_byte(change)
             return
+        if change.register == RESTARTED:
+            self._note_reset("the program has jumped to address 0", change.cycle)
+            return
         if change.register == MCUSR and is_reset(self._registers.get(MCUSR, 0), change.value):
             self._registers.clear()
+            self._note_reset("by the watchdog", change.cycle)
         was_lit = self._is_lit()
         self._registers[change.register] = change.value
         if change.register in _EMITTING and self._is_lit() and not was_lit:
@@ -201,6 +210,13 @@ class KilobotController:
         if change.register != PORTB:
             red, green, blue = led_of(self._registers)
             self._set_leds(red | green << 2 | blue << 4, change.cycle)
+
+    def _note_reset(self, cause: str, cycle: int) -> None:
+        """Add a line to the log. Jumps within 1 ms count once, as of a program that does nothing else."""
+        at = self._trial_cycle(cycle)
+        if at - self._reset_at >= FCY // 1000:
+            self._lines.append(SerialLine(at, f"reset: {cause}"))
+        self._reset_at = at
 
     def _is_lit(self) -> bool:
         """Whether an emitter of infrared light is on."""
@@ -266,6 +282,20 @@ class KilobotController:
     def place(self) -> str:
         """As `Controller.place`: function and line, and cycle."""
         return f"{self.machine.image.place(self.machine.pc)}, cycle {self.machine.cycle:,}"
+
+    def inspection(self) -> list[str]:
+        """Return lines of text with the instruction, the registers and the small variables; numbers are unsigned."""
+        machine = self.machine
+        registers = machine.peek_bytes(0, 32)
+        variables = sorted((one.address, one.size, one.name) for one in machine.image.symbols.all
+                           if one.space == "data" and one.kind == "object" and one.size in (1, 2, 4))  # fmt: skip
+        return [
+            machine.image.place(machine.pc) + ("  asleep" if machine.state.asleep else ""),
+            f"cycle {machine.cycle:,}  SP {machine.sp:04x}  SREG {machine.peek(ADDRESSES['SREG']):02x}",
+            *(f"R{n:<3} {registers[n : n + 16].hex(' ')}" for n in (0, 16)),
+            *(f"{name:<24} {machine.peek(address, size)}" for address, size, name in variables[:MAX_VARIABLES]),
+            *filter(None, [self._crowd.faults.get(self._index)]),
+        ]
 
     def close(self) -> None:
         """Do nothing: the machine is freed with the object."""

@@ -21,6 +21,7 @@ from arena.campaign.campaign import Plan, controllers_of
 from arena.debug.attach import AttachedRobot
 from arena.replay.page import sample_data
 from arena.robots.firmware_controller import FirmwareController, function_at
+from arena.robots.kilobot import KilobotController
 from arena.scene.loader import SceneError
 from arena.trial.checkpoints import CAN_FORK, PipeClosedError, PipeEnd, ProcessForker
 from arena.trial.record import Trial
@@ -175,7 +176,8 @@ class TrialSession:
     def send(self, robot: int, text: str) -> None:
         """Send `text` to a robot by Bluetooth."""
         self._require_between_quanta()
-        self._controller(robot)
+        if isinstance(self._controller(robot), KilobotController):
+            raise CommandRefusedError(f"robot {robot} is a kilobot: it has no Bluetooth")
         try:
             text.encode("latin-1")
         except UnicodeEncodeError:
@@ -261,8 +263,10 @@ class TrialSession:
         return Trial(Path("studio"), columns, self._metadata | {"faults": faults})
 
     def inspect(self, robot: int) -> dict[str, Any]:
-        """Return registers, call stack and threads of one robot; a scripted robot has none."""
+        """Return registers, call stack and threads of one robot; lines of text of a Kilobot; nothing of a script."""
         controller = self._controller(robot)
+        if isinstance(controller, KilobotController):
+            return {"robot": robot, "lines": controller.inspection()}
         if not isinstance(controller, FirmwareController):
             return {"robot": robot, "script": True}
         machine = controller.machine
@@ -456,6 +460,8 @@ class TrialSession:
     def _firmware_controller(self, robot: int) -> FirmwareController:
         """Return the controller of a robot with firmware. Raises CommandRefusedError for another robot."""
         controller = self._controller(robot)
+        if isinstance(controller, KilobotController):
+            raise CommandRefusedError(f"robot {robot} is a kilobot: breakpoints and the debugger are for e-pucks only")
         if not isinstance(controller, FirmwareController):
             raise CommandRefusedError(f"robot {robot} is scripted: it has no firmware")
         return controller

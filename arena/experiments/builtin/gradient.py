@@ -24,6 +24,8 @@ CURVES = [
 
 def true_hops(places: Floats, reach_cm: float) -> NDArray[np.int64]:
     """Return the hops of each robot from robot 0 over distances up to `reach_cm`; -1: no path."""
+    if not len(places):
+        return np.zeros(0, dtype=np.int64)
     apart = np.hypot(*(places[:, None] - places[None]).transpose(2, 0, 1))
     hops = shortest_path(csr_array(apart <= reach_cm), unweighted=True, indices=0)
     return np.where(np.isfinite(hops), hops, -1).astype(np.int64)
@@ -44,6 +46,6 @@ def all_curves(samples: TrialSamples) -> Mapping[str, Floats]:
     for sample, robots in enumerate(samples.robots):
         hops = true_hops(robots[:, :2], samples.scene.kilobots.reach_cm)
         wanted = np.where(hops < 0, 0, np.array(HOP_COLOURS)[hops % len(HOP_COLOURS)])
-        correct.append(float((shown[sample] == wanted).mean()))
-        longest.append(float(hops.max()))
+        correct.append(float((shown[sample] == wanted).mean()) if len(hops) else 1.0)
+        longest.append(float(hops.max(initial=0)))
     return {"correct": np.array(correct), "hops": np.array(longest)}

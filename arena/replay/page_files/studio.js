@@ -43,7 +43,7 @@ async function refresh(failures = 0) {
 }
 function hex(value, digits) { return value.toString(16).padStart(digits, "0"); }
 function inspect(of) {
-  const rows = of.script ? ["scripted robot: no firmware"] : [
+  const rows = of.script ? ["scripted robot: no firmware"] : of.lines ? of.lines : [
     `${hex(of.pc, 6)} ${of.place}${of.asleep ? "  asleep" : ""}`, `cycle ${of.cycle}  SR ${hex(of.sr, 4)}`,
     ...[0, 8].map(from => `W${from}`.padEnd(4) + of.w.slice(from, from + 8).map(w => hex(w, 4)).join(" ")),
     ...of.threads.map(one => `${one.name.padEnd(14)} ${one.state.padEnd(9)}` + (one.size === null ? "" : `stack ${one.used ?? "?"} of ${one.size}`)),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -39,6 +40,8 @@ def test_hops_count_the_shortest_path() -> None:
     curves = experiment_of("gradient").all_curves(samples("gradient", [places] * 3, *shown, LedEvent(3, 1.5, 4)))
     assert curves["correct"].tolist() == [0.2, 0.8, 1.0]
     assert curves["hops"].tolist() == [2.0] * 3
+    none = replace(samples("gradient", [places]), robots=np.zeros((1, 0, 3)))
+    assert experiment_of("gradient").all_curves(none)["correct"].tolist() == [1.0]
 
 
 def test_the_spread_of_blinks_is_a_circular_arc() -> None:

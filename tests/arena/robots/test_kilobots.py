@@ -157,6 +157,16 @@ def test_a_fault_stops_one_robot_only(run: Run, image: Callable[[str], AvrImage]
     assert int(found["r1_leds"][-1]) == 1
 
 
+def test_resets_are_in_the_log(run: Run, image: Callable[[str], AvrImage]) -> None:
+    """A watchdog reset and a jump to address 0 are lines of the record."""
+    image("    if (MCUSR & 8) {\n        __builtin_avr_delay_cycles(12000);\n"
+          '        __asm__ volatile ("jmp 0");\n    }\n    WDTCSR = 0x18, WDTCSR = 0x08;')  # fmt: skip
+    found = run(kilobots("[[50, 50]]"), 0.1, "--set", "clock.sample_s=0.05")
+    lines = [line["text"] for sample in found["log"] for line in sample]
+    assert lines[0] == "reset: by the watchdog"
+    assert lines[1] == "reset: the program has jumped to address 0"
+
+
 def test_kinds_mix(run: Run) -> None:
     """A scripted e-puck and Kilobots share a world; a removed battery darkens one Kilobot."""
     scene = '[start]\nremote = ""\noff = [[1, 2.0]]\n' + kilobots("[[100, 100], [105, 100]]", "gradient")
@@ -206,6 +216,9 @@ def test_wrong_values_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture[
     path.write_text('name = "test"\n[[robots]]\nkind = "kilobot"\n')
     assert main(["run", str(path), "--out", str(tmp_path / "out")]) == 2
     assert "a Kilobot runs the image of a firmware; none is named" in capsys.readouterr().err
+    path.write_text('name = "test"\n[[robots]]\nkind = "kilobot"\n[[robots]]\n')
+    assert main(["run", str(path), "--brain", "gradient", "--out", str(tmp_path / "out")]) == 2
+    assert "--brain gradient cannot run on robots of two kinds" in capsys.readouterr().err
     path.write_text('name = "test"\n[[robots]]\nkind = "kilobot"\nimage = "nothing.hex"\n')
     assert main(["run", str(path), "--out", str(tmp_path / "out")]) == 2
     assert "expected an ELF or HEX file for AVR, or one of edge, gradient, orbit, " in capsys.readouterr().err
