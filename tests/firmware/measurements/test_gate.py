@@ -1,6 +1,7 @@
 """Planted regressions fail `emu footprint` and `emu cycles` with the right row and line; harmless changes pass.
 
-Regressions that do not touch the same row are planted together, so that few images are built.
+Regressions that do not touch the same row are planted together in four images. The commit determines the two of them
+that are built.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from pathlib import Path
 import pytest
 
 from emu.cli import main
+from tests.fuzz.seeds import base_seed
 
 HERE = Path(__file__).parent
 SOURCE = HERE / "gate" / "main.c"
@@ -190,7 +192,7 @@ def rows_of(elf: str, baselines: Path, capsys: pytest.CaptureFixture[str]) -> tu
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("number", range(len(REGRESSIONS)))
+@pytest.mark.parametrize("number", range(base_seed() % 2, len(REGRESSIONS), 2))
 def test_a_planted_regression_fails_with_its_row_and_line(built, baselines, capsys, number):
     elf, text = built(REGRESSIONS[number])
     failed, statuses = rows_of(elf, baselines, capsys)
