@@ -39,7 +39,8 @@ def checked(image: Image) -> None:
 def rows(image: Image, loader: Loader, further: Sequence[Row] = ()) -> list[Row]:
     """Return the rows to write, in order. Raises ValueError if the image has words at the loader's addresses.
 
-    `further` rows are outside of the image, such as the key of the swarm.
+    `further` rows are outside of the image, such as the key of the swarm. Raises ValueError if they do not begin with a
+    row of flash, or are the loader's or the image's own.
 
     1. The entry's row without the GOTO. Its four erased words are NOPs that lead into the loader, so that a robot whose
     transfer is interrupted waits in its loader at every start.
@@ -56,6 +57,11 @@ def rows(image: Image, loader: Loader, further: Sequence[Row] = ()) -> list[Row]
                 f"{image.path}: has words at {address:#08x}, where the robot's boot loader ({loader.name}) is:"
                 f" {loader.entry:#08x} and up are its own"
             )
+    for address, _ in further:
+        if address % ROW_UNITS or address not in flash or address >= loader.entry_row:
+            raise ValueError(f"{image.path}: {address:#08x} is no row of flash below the boot loader")
+        if any(image.word(place) is not None for place in range(address, address + ROW_UNITS, 2)):
+            raise ValueError(f"{image.path}: has words at {address:#08x}, where the key of the swarm is kept")
     words = image.flash()
     entry = words[:2].tolist()
     words[:2] = array("I", goto(loader.start))

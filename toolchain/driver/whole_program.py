@@ -32,8 +32,8 @@ def read_module(source: Path, content: bytes) -> llvm.ModuleRef:
     try:
         if is_bitcode(content):
             return llvm.parse_bitcode(content)
-        return llvm.parse_assembly(content.decode())
-    except (RuntimeError, UnicodeDecodeError) as error:
+        return llvm.parse_assembly(content.decode(errors="replace"))
+    except RuntimeError as error:
         raise ToolError(f"{source}: not readable as LLVM IR: {str(error).strip()}") from error
 
 

@@ -96,7 +96,7 @@ class Reader(InstrReader):
             words = re.findall(r'"[^"]*"(?:="[^"]*")?|[\w]+(?:\([^)]*\))?', body)
             self.attr_groups[group] = frozenset(w.replace('"', "") for w in words)
         elif line.startswith("source_filename"):
-            self.module.source = unquote(line.split('"')[1]).decode()
+            self.module.source = unquote(line.split('"')[1]).decode(errors="replace")
         elif line.startswith("module asm"):
             self.module.module_asm.append(unquote(line.split('"', 1)[1].rsplit('"', 1)[0]).decode())
         elif not line.startswith(("target", "%", "$", "uselistorder")):

@@ -13,8 +13,9 @@ from emu.image.loader import load_image
 from openswarm.cli import main
 from openswarm.flashing.ascon import tag
 from openswarm.flashing.authentication import authenticated, key_row, read_key
-from openswarm.flashing.loaders import ROW_BYTES
+from openswarm.flashing.loaders import LOADERS, ROW_BYTES
 from openswarm.flashing.program import ROWS, Program
+from openswarm.flashing.rows import rows
 from tests.firmware.update.host_programs import OPENSWARM, on_host, run_on_host
 from tests.firmware.update.test_update import ACTIVATE, CONFIRM, RECEIVE, TARGET_APPS, Robot, rows_of
 
@@ -200,6 +201,25 @@ def test_a_key_file_is_read_with_its_end_of_line(tmp_path):
     assert read_key(key) == bytes.fromhex("00112233445566778899aabbccddeeff")
     with pytest.raises(ValueError, match="expected a regular file"):
         read_key(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("address", "reason"),
+    [
+        (LOADERS[0x91].start, "no row of flash below the boot loader"),
+        (LOADERS[0x91].entry_row, "no row of flash below the boot loader"),
+        (0x7FFC00, "no row of flash below the boot loader"),
+        (0x167C2, "no row of flash below the boot loader"),
+        (0, "has words at 0x000000, where the key of the swarm is kept"),
+    ],
+)
+def test_a_key_slot_elsewhere_is_refused(tmp_path, address, reason):
+    """Firmware names the slot by a symbol; a wrong one cannot make the command write the loader's or its own rows."""
+    (tmp_path / "lamp.c").write_text("int main(void) { return 0; }\n")
+    image = load_image(emu.build(tmp_path / "lamp.c", output=tmp_path / "lamp.elf"))
+    assert rows(image, LOADERS[0x91], [(0x167C0, [0] * 32)])[-2] == (0x167C0, [0] * 32)
+    with pytest.raises(ValueError, match=reason):
+        rows(image, LOADERS[0x91], [(address, [0] * 32)])
 
 
 def test_firmware_without_the_option_takes_no_key(tmp_path):

@@ -113,6 +113,14 @@ def test_dependency_file_names_headers_and_output(capsys: pytest.CaptureFixture[
     assert "stdint.h" in (tmp_path / "deps").read_text()
 
 
+@pytest.mark.parametrize("flags", [["-c", "-g"], ["-g"]])
+def test_a_source_whose_name_is_no_text_is_compiled(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, flags: list[str]
+) -> None:
+    source = write(tmp_path, os.fsdecode(b"caf\xe9.c"), "int main(void) { return 3; }\n")
+    assert cc(capsys, *flags, source, "-o", tmp_path / "out.elf") == (0, "")
+
+
 def test_diagnostics_carry_the_users_file_and_line(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     """All diagnostics of clang are printed with the user's file and line; warnings do not fail the run."""
     source = write(tmp_path, "warn.c", "int main(void)\n{\n    int unused = 3;\n    return 0;\n}\n")
