@@ -69,9 +69,13 @@ class DiskCache:
             if not is_usable(self.where.parent, self.where, parent):
                 return
             handle, name = tempfile.mkstemp(dir=parent)
-            with os.fdopen(handle, "wb") as file:
-                file.write(hashlib.sha256(content).digest() + content)
-            os.replace(name, parent / key)
+            try:
+                with os.fdopen(handle, "wb") as file:
+                    file.write(hashlib.sha256(content).digest() + content)
+                os.replace(name, parent / key)
+            except OSError:
+                os.unlink(name)  # half a file on a full disk
+                raise
             self._evict(parent, key)
         except OSError:
             return

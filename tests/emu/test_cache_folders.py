@@ -6,14 +6,18 @@ import os
 import stat
 import subprocess
 import sys
+import tempfile
 from collections.abc import Iterator
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
 from emu.dspic30f.jit.cache import ObjectCache
+from emu.host import disk_cache
 from emu.host.paths import runtime_libraries
 from emu.host.private_folder import danger
+from tests.full_device import FULL_DEVICE, needs_full_device
 from toolchain import device_header
 from toolchain.driver import driver, runtime_archive
 
@@ -56,6 +60,23 @@ def test_all_new_folders_are_private(cache: Path) -> None:
     assert {path.name for path in folders} >= {"new", "cache", "jit", "00", "toolchain", "headers"}
     assert {stat.S_IMODE(path.stat().st_mode) for path in folders} == {0o700}
     assert objects.get("00key") == b"code"
+
+
+@needs_full_device
+def test_a_full_disk_leaves_no_half_written_object(cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """An object that does not fit is not stored, and nothing of it stays."""
+    objects = fill(cache)
+    before = sorted(cache.rglob("*"))
+
+    def mkstemp(dir: Path) -> tuple[int, str]:
+        handle, name = tempfile.mkstemp(dir=dir)
+        os.close(handle)
+        return os.open(FULL_DEVICE, os.O_WRONLY), name
+
+    monkeypatch.setattr(disk_cache, "tempfile", SimpleNamespace(mkstemp=mkstemp))
+    objects.put("00other", b"code")
+    assert sorted(cache.rglob("*")) == before
+    assert (objects.get("00other"), objects.get("00key")) == (None, b"code")
 
 
 @pytest.mark.parametrize("place", ["", "jit", "jit/00", "toolchain"])
