@@ -179,7 +179,7 @@ def _run_trial(number: int) -> Outcome:
 def _run(options: argparse.Namespace, campaign: Campaign, numbers: list[int]) -> Iterator[Outcome]:
     if not numbers:
         return
-    _begin(options, campaign)  # here, so that this process reports errors of the golden run
+    _begin(options, campaign)  # also with several jobs: this process then reports errors of the golden run
     if options.jobs == 1:
         yield from map(_run_trial, numbers)
         return

@@ -12,7 +12,7 @@ from emu.dap.console import console_command
 from emu.dap.debuggee import Debuggee, StopEvent
 from emu.dap.sfrs import sfr_groups
 from emu.dap.state_changes import MemoryWrite, StateChange, assignment
-from emu.dap.variables import ReferenceTable, Row, SourceFiles, disassembled
+from emu.dap.variables import ReferenceTable, Row, SourceFiles, disassembly_rows
 from emu.debug.expressions.expression import evaluate
 from emu.debug.inspector import Value
 
@@ -134,7 +134,7 @@ class StateRequests(ABC):
         address += 2 * int(arguments.get("instructionOffset") or 0)
         symbols = bool(arguments.get("resolveSymbols"))
         count = _size(arguments, "instructionCount")
-        return {"instructions": disassembled(self._debuggee.inspector, self._sources, address & ~1, count, symbols)}
+        return {"instructions": disassembly_rows(self._debuggee.inspector, self._sources, address & ~1, count, symbols)}
 
     def _do_readMemory(self, arguments: Row) -> Row:
         address = int(str(arguments["memoryReference"]), 0) + int(arguments.get("offset") or 0)

@@ -240,7 +240,7 @@ class SourceFiles:
         return behind[0], tuple(sorted(found.values()))
 
 
-def disassembled(inspector: Inspector, sources: SourceFiles, address: int, count: int, symbols: bool) -> list[Row]:
+def disassembly_rows(inspector: Inspector, sources: SourceFiles, address: int, count: int, symbols: bool) -> list[Row]:
     """Return exactly `count` rows from `address`, one per program word.
 
     The first word of a line has its source line.

@@ -58,7 +58,7 @@ class InstructionLog:
         self._undo: Final[list[Callable[[], None]]] = []
 
     def start(self) -> None:
-        """Start to log what the sequencer does."""
+        """Start to log the instructions and boundaries that the sequencer executes."""
         sequencer = self._core.sequencer
         if "execute" in vars(sequencer):
             raise ValueError(ONE_INSTRUMENT)

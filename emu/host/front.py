@@ -1,4 +1,4 @@
-"""What every command line answers before it runs a command: help, version, unknown commands."""
+"""Answers of all command lines to words that name no command: help, version, unknown commands."""
 
 from __future__ import annotations
 

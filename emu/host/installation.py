@@ -1,4 +1,4 @@
-"""How the package is installed with pip: from a wheel file, a checkout or a VCS address. It is in no package index.
+"""The pip command that installs the package: from a wheel file, a checkout or a VCS address, as it is in no index.
 
 This is the only module that spells the command. It repeats the address from which this installation was made (PEP 610).
 """

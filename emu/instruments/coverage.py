@@ -88,7 +88,7 @@ def count_executions(machine: Machine, counts: Counts) -> Callable[[], None]:
         stop_native()
         stop_interpreted()
         program = machine.program
-        for numbers, counter in ((counting.executed, counts.executed), (counting.taken, counts.taken)):
+        for numbers, counter in ((counting.executions, counts.executed), (counting.taken_branches, counts.taken)):
             for word in numbers.nonzero()[0].tolist():
                 pc = 2 * word
                 if counter is counts.executed or is_conditional(program.word(pc), program.word(pc + 2), pc):
@@ -200,12 +200,12 @@ class CoverageReport:
                 self.instructions_run += insn is not None and self._counts.executed[pc] > 0
                 if is_conditional(word1, word2, pc):
                     taken = self._counts.taken[pc]
-                    ways = (self._counts.executed[pc] - taken, taken)
+                    outcomes = (self._counts.executed[pc] - taken, taken)
                     self.outcomes += 2
-                    self.outcomes_seen += sum(way > 0 for way in ways)
+                    self.outcomes_seen += sum(times > 0 for times in outcomes)
                     line = image.lines.find(pc)
                     if line is not None and line.line:
-                        self._file(line.file).branches.setdefault(line.line, []).append(ways)
+                        self._file(line.file).branches.setdefault(line.line, []).append(outcomes)
                 pc += 2 * (insn.words if insn is not None else 1)
 
     def _functions(self) -> None:
@@ -225,12 +225,12 @@ class CoverageReport:
             yield f"FNF:{len(one.functions)}"
             yield f"FNH:{sum(count > 0 for _, count in one.functions.values())}"
             for line, branches in sorted(one.branches.items()):
-                for block, ways in enumerate(branches):
-                    for branch, way in enumerate(ways):
-                        yield f"BRDA:{line},{block},{branch},{way if any(ways) else '-'}"
-            ways_of = [way for branches in one.branches.values() for ways in branches for way in ways]
-            yield f"BRF:{len(ways_of)}"
-            yield f"BRH:{sum(way > 0 for way in ways_of)}"
+                for block, outcomes in enumerate(branches):
+                    for branch, times in enumerate(outcomes):
+                        yield f"BRDA:{line},{block},{branch},{times if any(outcomes) else '-'}"
+            counts = [times for pairs in one.branches.values() for pair in pairs for times in pair]
+            yield f"BRF:{len(counts)}"
+            yield f"BRH:{sum(times > 0 for times in counts)}"
             for line, count in sorted(one.lines.items()):
                 yield f"DA:{line},{count}"
             yield f"LF:{len(one.lines)}"
@@ -253,19 +253,19 @@ class CoverageReport:
         classes = ElementTree.SubElement(package, "classes")
         for name, one in sorted(self.files.items()):
             hit = sum(count > 0 for count in one.lines.values())
-            branches = [way for all_ways in one.branches.values() for ways in all_ways for way in ways]
+            branches = [times for pairs in one.branches.values() for pair in pairs for times in pair]
             entry = ElementTree.SubElement(classes, "class", {
                 "name": Path(name).name, "filename": str(path_of(name)), "line-rate": _rate(hit, len(one.lines)),
-                "branch-rate": _rate(sum(way > 0 for way in branches), len(branches)), "complexity": "0",
+                "branch-rate": _rate(sum(times > 0 for times in branches), len(branches)), "complexity": "0",
             })  # fmt: skip
             ElementTree.SubElement(entry, "methods")
             lines = ElementTree.SubElement(entry, "lines")
             for line, count in sorted(one.lines.items()):
-                ways = [way for pair in one.branches.get(line, ()) for way in pair]
-                facts = {"number": str(line), "hits": str(count), "branch": "true" if ways else "false"}
-                if ways:
-                    seen = sum(way > 0 for way in ways)
-                    facts["condition-coverage"] = f"{100 * seen // len(ways)}% ({seen}/{len(ways)})"
+                outcomes = [times for pair in one.branches.get(line, ()) for times in pair]
+                facts = {"number": str(line), "hits": str(count), "branch": "true" if outcomes else "false"}
+                if outcomes:
+                    seen = sum(times > 0 for times in outcomes)
+                    facts["condition-coverage"] = f"{100 * seen // len(outcomes)}% ({seen}/{len(outcomes)})"
                 ElementTree.SubElement(lines, "line", facts)
         ElementTree.indent(top)
         return '<?xml version="1.0" ?>\n' + ElementTree.tostring(top, encoding="unicode") + "\n"

@@ -27,8 +27,8 @@ def lines_run(one: FileCoverage) -> tuple[int, int]:
 
 def outcomes_seen(one: FileCoverage) -> tuple[int, int]:
     """Return the numbers of branch outcomes that occurred and of all outcomes."""
-    ways = [way for branches in one.branches.values() for pair in branches for way in pair]
-    return sum(way > 0 for way in ways), len(ways)
+    outcomes = [times for branches in one.branches.values() for pair in branches for times in pair]
+    return sum(times > 0 for times in outcomes), len(outcomes)
 
 
 def percent(part: int, whole: int) -> str:
@@ -71,7 +71,7 @@ def _lines(one: FileCoverage, path: Path) -> Iterator[str]:
     yield "<table>\n"
     for number in range(1, max(len(text), max(one.lines, default=0)) + 1):
         count, pairs = one.lines.get(number), one.branches.get(number, [])
-        missed = any(way == 0 for pair in pairs for way in pair)
+        missed = any(times == 0 for pair in pairs for times in pair)
         kind = "" if count is None else "not" if count == 0 else "part" if missed else "run"
         shown = "" if count is None else f"{count:,}"
         code = escape(text[number - 1]) if number <= len(text) else ""

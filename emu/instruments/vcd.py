@@ -32,9 +32,10 @@ CPU: Final = ("ipl", "asleep", "thread")
 
 
 class WaveformRecorder:
-    """Records `machine` while `advance` runs it. `watch` lists names of CPU, or expressions that denote a variable.
+    """Records `machine` while `advance` runs it.
 
-    With `again` it also records the pins and bytes of replayed cycles, for which other listeners are not called.
+    `watch` lists names of CPU states (`CPU`), or C expressions that denote a variable. With `again` it also records the
+    pins and bytes of replayed cycles, for which other listeners are not called.
     Raises ValueError for a name that cannot be watched, or if another instrument runs.
     """
 

@@ -91,7 +91,7 @@ def run_kilobot(
         _report(run, observer.reports_of(machine.changes), show)
     except KeyboardInterrupt:
         run.reason = "interrupted"
-    _report(run, observer.end(), show)
+    _report(run, observer.final_reports(), show)
     run.notes += _notes(machine)
     run.host_seconds = time.perf_counter() - start
     run.pc = machine.pc if run.fault is None else run.fault.pc
@@ -100,7 +100,7 @@ def run_kilobot(
 
 
 def _notes(machine: Atmega328p) -> list[str]:
-    """Return what the user should know of a run besides its end."""
+    """Return notes for the user about a run: registers without a model, a stack overflow, the call before a fault."""
     notes = []
     if machine.state.unmodelled:
         notes.append(f"register {machine.state.unmodelled:#04x} has no model; it behaves as plain memory")
@@ -121,7 +121,7 @@ def _send(swarm: KilobotSwarm, command: str) -> int | None:
 
 
 def _report(run: KilobotRun, reports: Iterable[Report], show: bool) -> None:
-    """Add reports to the result and print them if wanted."""
+    """Add reports to the result; with `show`, also print them."""
     for report in reports:
         run.reports.append(report)
         if show:

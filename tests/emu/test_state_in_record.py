@@ -35,7 +35,7 @@ OUTSIDE = {
     "AnalogInputs._source": WIRING, "Peripherals.config": WIRING, "Peripheral._timestamps": WIRING,
     "Peripheral._slots": WIRING, "I2cBus.devices": WIRING, "Timer.high": WIRING, "Timer.upper": WIRING,
     "Timer._hold": WIRING, "Uart._capture": WIRING, "Spi._exchange": WIRING, "Pins._readers": WIRING,
-    "Pins._ports_with_ring_watchers": WIRING, "Pins.described": WIRING, "Pins._on_waveform": WIRING,
+    "Pins._ports_with_ring_watchers": WIRING, "Pins.rule_waveforms": WIRING, "Pins._on_waveform": WIRING,
     "Bus.writable": DERIVED, "Bus.clear_only": DERIVED, "Bus.compute": DERIVED, "Bus.on_read": DERIVED,
     "Bus.on_write": DERIVED, "Bus.rules": DERIVED, "ModuleDisable._off": DERIVED, "Pins._waveforms": DERIVED,
     "Scan.timing": DERIVED, "Scan.start": DERIVED, "Scan.running": DERIVED, "Camera._readout": DERIVED,

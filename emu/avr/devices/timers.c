@@ -75,7 +75,8 @@ static void consider(struct milestone *next, u64 ticks, u32 flags, u32 updates, 
     next->flags |= flags, next->updates |= updates, next->place |= place;
 }
 
-static u64 ahead(u32 from, u32 to, u32 period)
+// Return the ticks after which a position of the period is reached next, at least 1.
+static u64 ticks_to(u32 from, u32 to, u32 period)
 {
     u32 target = to % period;
     return target > from ? target - from : target + period - from;
@@ -95,14 +96,14 @@ static struct milestone next_milestone(const struct avr *m, u32 n, const struct 
         return next;
     }
     u32 top = turn_of(m, n, w), period = 2 * top;
-    consider(&next, ahead(position, 0, period), 0, w->kind == FREQUENCY_PWM, AT_BOTTOM);
-    consider(&next, ahead(position, top, period), 0, w->kind == PHASE_PWM, AT_TOP);
-    consider(&next, ahead(position, 1, period), OVERFLOW, 0, 0);
+    consider(&next, ticks_to(position, 0, period), 0, w->kind == FREQUENCY_PWM, AT_BOTTOM);
+    consider(&next, ticks_to(position, top, period), 0, w->kind == PHASE_PWM, AT_TOP);
+    consider(&next, ticks_to(position, 1, period), OVERFLOW, 0, 0);
     for (u32 c = 0; c < 2; c++) {
         u32 value = m->timer_compare[2 * n + c];
         if (value <= top) {
-            consider(&next, ahead(position, value + 1, period), COMPARE_A << c, 0, 0);
-            consider(&next, ahead(position, period - value + 1, period), COMPARE_A << c, 0, 0);
+            consider(&next, ticks_to(position, value + 1, period), COMPARE_A << c, 0, 0);
+            consider(&next, ticks_to(position, period - value + 1, period), COMPARE_A << c, 0, 0);
         }
     }
     return next;

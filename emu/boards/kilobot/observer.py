@@ -108,7 +108,7 @@ class KilobotObserver:
         for since, kind in due:
             yield from self._settled(since, kind)
 
-    def end(self) -> Iterator[Report]:
+    def final_reports(self) -> Iterator[Report]:
         """Yield what is still held back at the end of a run: the last states, and an unfinished line of the UART."""
         for since, kind in sorted((since, kind) for kind, (since, _) in self._waiting.items()):
             yield from self._settled(since, kind)

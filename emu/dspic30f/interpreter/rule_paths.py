@@ -124,7 +124,7 @@ class PythonRulePaths(RulePaths):
 
 
 @lru_cache(maxsize=4096)
-def compiled(text: str) -> CodeType:
+def code_of(text: str) -> CodeType:
     """Return the compiled text of a function, which all machines of the process share."""
     return compile(text, "<flow rule>", "exec")
 
@@ -134,9 +134,9 @@ def function_of(record: Record, rule: Callable[..., R], operands: Any, *paramete
     views = {"u16": record.u16, "u64": record.u64}
     lines = [f"def run({', '.join(parameters + tuple(f'{name}={name}' for name in views))}):"]
     values = [Expr(name, 0, LIMIT, atom=True) for name in parameters]
-    ways = PythonRulePaths(lambda line: lines.append("    " + line))
-    ways.each(lambda m: rule(m, operands, *values), lambda result: ways.line(f"return {result}"))
+    paths = PythonRulePaths(lambda line: lines.append("    " + line))
+    paths.each(lambda m: rule(m, operands, *values), lambda result: paths.line(f"return {result}"))
     namespace: dict[str, Any] = dict(views)
-    exec(compiled("\n".join(lines)), namespace)
+    exec(code_of("\n".join(lines)), namespace)
     function: Callable[..., R] = namespace["run"]
     return function

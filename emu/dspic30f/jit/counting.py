@@ -105,12 +105,12 @@ class ExecutionCounting:
         self.address = int(self._memory.ctypes.data)
 
     @property
-    def executed(self) -> npt.NDArray[np.int64]:
+    def executions(self) -> npt.NDArray[np.int64]:
         """Return the executions by program word."""
         return np.cumsum(self._memory[: self._words])
 
     @property
-    def taken(self) -> npt.NDArray[np.int64]:
+    def taken_branches(self) -> npt.NDArray[np.int64]:
         """Return how often each branch or skip was taken, by program word."""
         return self._memory[self._words + 1 : 2 * self._words + 1]
 

@@ -229,7 +229,7 @@ class JitEngine:
                 self._miss(limit)
 
     def natively(self, limit: int) -> bool:
-        """Implement `Engine.natively`. Calls are often short, so this function reads the record directly."""
+        """Run native code as `Engine.natively` specifies. Calls are often short, so it reads the record directly."""
         start = self._u64[self._now]
         if self._dispatch is None or not start or self._u16[self._edt]:  # a native boundary needs a preceding cycle
             return False
@@ -284,11 +284,11 @@ class JitEngine:
         return False
 
     def pass_limits(self, period: int, last: int) -> None:
-        """Implement `Engine.pass_limits`."""
+        """Let native code pass limits without returning, as `Engine.pass_limits` specifies."""
         self._env[PERIOD], self._env[LAST_LIMIT] = period, last
 
     def passed(self) -> list[int]:
-        """Implement `Engine.passed`."""
+        """Return the first boundary (Tcy) at or after each limit passed since the last call."""
         count = self._env[PASSED_COUNT]
         if not count:
             return []

@@ -40,5 +40,5 @@ PASSED: Final = 12
 PASSED_ROOM: Final = 1024
 """Capacity of the list PASSED."""
 REFRESHED: Final = PASSED + PASSED_ROOM
-"""First entry of a list: instructions for which a device was updated (`NativeHandle.fresh`)."""
+"""First entry of a list: instructions that read a register which a device refreshes (`Native.fresh`)."""
 ENV_WORDS: Final = REFRESHED + FRESH_ROOM

@@ -109,13 +109,13 @@ class ClockPin:
     name: tuple[int, int]
 
     @property
-    def described(self) -> tuple[RuleWaveform, Cell] | None:
+    def rule_waveform(self) -> tuple[RuleWaveform, Cell] | None:
         """The rule waveform on the pin and the cell that says whether it is attached; None if there is none."""
         return self.pins.get(self.name)
 
     def __repr__(self) -> str:
         """Return a text that is equal in every process, because the key of cached native code contains it."""
-        wave = self.described
+        wave = self.rule_waveform
         return f"ClockPin({self.name}, {wave and (type(wave[0]).__name__, wave[1])})"
 
 
@@ -136,7 +136,7 @@ class MatchOperands:
 
 def fire_match(m: RuleBuilder, p: MatchOperands) -> None:
     """Handle the match of a timer that interrupts periodically (§7 rule 2) or is clocked by a rule waveform."""
-    t, clock = p.timer, p.clock.described
+    t, clock = p.timer, p.clock.rule_waveform
     period = m.get(t.period)
     if clock is None:
         m.require(period != 0)
@@ -179,7 +179,7 @@ def write_ton(m: RuleBuilder, p: MatchOperands, value: Number, lanes: int) -> bo
     Off: the count is known if, since the last write, either no edge has occurred or exactly those up to the match. On:
     counting starts in the next cycle. In both cases the prescaler is empty (§7 rule 6).
     """
-    t, clock = p.timer, p.clock.described
+    t, clock = p.timer, p.clock.rule_waveform
     if clock is None or not lanes & p.ton:
         return False
     wave, attached = clock

@@ -98,7 +98,7 @@ class Timer(Counter):
             ton=ton,
             tcs=tcs,
             tckps=con.fields["TCKPS"][0],
-            clock=ClockPin(self.context.pins.described, (self._port, self._pin)),
+            clock=ClockPin(self.context.pins.rule_waveforms, (self._port, self._pin)),
             pin=self._pin,
         )
 

@@ -56,7 +56,7 @@ class Camera(BoardPart, I2cDevice):
         self._pointer: Final = self.cell("pointer", "B")
         self._pointer_next: Final = self.cell("pointer_next", "B")
         self._plugged: Final = self.cell("plugged", "B")
-        self.pins.describe(SYNC_PORT, HREF | VSYNC | PCLK, self.scan, self._plugged.cell)
+        self.pins.add_rule_waveform(SYNC_PORT, HREF | VSYNC | PCLK, self.scan, self._plugged.cell)
         self._line: Final = self.array("line", "B", 2 * LINE_PIXELS)
         self._line_address: Final = self.record.address + self.record.fields["camera.line"].offset
         self._u64: Final = self.record.u64

@@ -33,11 +33,11 @@ class CycleCounter:
     """Null counter of a translated function: emits nothing. `AccountingCounter` has the same interface."""
 
     unsettled: tuple[object, ...] = ()
-    """Cycles that an exit would have to add. Exits that add different cycles need different blocks."""
+    """Cycles that an exit would have to add. Exits that add different cycles are different IR blocks."""
     splits_repeats = False
-    """Whether block code leaves a REPEAT with stores to exact code, which ends every iteration by itself."""
+    """Whether each iteration of a REPEAT with stores needs its own log check; exact code then runs the REPEAT."""
     checks_asleep = False
-    """Whether `check_changes` is needed after the start of Idle."""
+    """Whether the start of Idle can change a watched number, so that it needs `check_changes`."""
 
     def begin(self, emitter: Emitter, offset: Mapping[str, int]) -> None:
         """Prepare for the function that `emitter` writes."""
@@ -45,31 +45,31 @@ class CycleCounter:
     def prologue(self, head: Emitter) -> None:
         """Emit the preparation of the counter into the first block of the function."""
 
-    def spend(self, pc: int, cycles: Number) -> None:
+    def add_cycles(self, pc: int, cycles: Number) -> None:
         """Account for `cycles` of the instruction at `pc`."""
 
-    def execute(self, pc: int, times: Number = 1) -> None:
+    def count_execution(self, pc: int, times: Number = 1) -> None:
         """Count executions of the instruction at `pc`."""
 
-    def take(self, pc: int, times: Number = 1) -> None:
+    def count_taken(self, pc: int, times: Number = 1) -> None:
         """Count that the conditional branch or skip at `pc` is taken."""
 
-    def settle(self) -> None:
+    def flush(self) -> None:
         """Emit the additions at the end of a block."""
 
-    def store(self) -> None:
+    def flush_at_exit(self) -> None:
         """Emit the additions at an exit from the middle of a block."""
 
-    def level_changed(self) -> None:
+    def select_level(self) -> None:
         """Select the cells of the new CPU priority, after a write of SR."""
 
-    def called(self, site: int, target: Number, stack: Number, cycle: Number) -> None:
+    def log_call(self, site: int, target: Number, stack: Number, cycle: Number) -> None:
         """Log the call at `site`, whose return address lies at `stack`."""
 
-    def returned(self, site: int, target: Number, stack: Number, cycle: Number) -> None:
+    def log_return(self, site: int, target: Number, stack: Number, cycle: Number) -> None:
         """Log the return at `site`, whose return address was at `stack`."""
 
-    def take_back_cycle(self, pc: int) -> None:
+    def subtract_third_cycle(self, pc: int) -> None:
         """Subtract the third cycle of the RETFIE at `pc`, because an exception may replace it."""
 
     def begin_instruction(self, pc: int) -> None:
@@ -140,32 +140,32 @@ class AccountingCounter(CycleCounter):
         self._e.line(f"{cell} = getelementptr i64, ptr {cells}, i64 {pc >> 1}")
         return cell
 
-    def spend(self, pc: int, cycles: Number) -> None:
+    def add_cycles(self, pc: int, cycles: Number) -> None:
         """Add the cycles to the block's sums."""
         row = self._row_of(pc)
         self._spent[row] = self._spent.get(row, 0) + cycles
 
-    def settle(self) -> None:
+    def flush(self) -> None:
         """Emit the additions and clear the sums."""
-        self.store()
+        self.flush_at_exit()
         self._spent.clear()
 
-    def store(self) -> None:
+    def flush_at_exit(self) -> None:
         """Emit the additions; keep the sums for the rest of the block."""
         for row, cycles in self._spent.items():
             cell = self._cell(row)
             self._e.store(cell, self._e.load(cell, 64) + cycles, 64)
 
-    def level_changed(self) -> None:
+    def select_level(self) -> None:
         """Account the cycles so far to the old CPU priority, then select the new priority's cells."""
-        self.settle()
+        self.flush()
         self._select_level(self._e)
 
-    def called(self, site: int, target: Number, stack: Number, cycle: Number) -> None:
+    def log_call(self, site: int, target: Number, stack: Number, cycle: Number) -> None:
         """Emit a log entry."""
         self._log(CALLED, site, target, stack, cycle)
 
-    def returned(self, site: int, target: Number, stack: Number, cycle: Number) -> None:
+    def log_return(self, site: int, target: Number, stack: Number, cycle: Number) -> None:
         """Emit a log entry."""
         self._log(RETURNED, site, target, stack, cycle)
 
@@ -182,8 +182,11 @@ class AccountingCounter(CycleCounter):
             e.store(at, word, 64)
         e.store(count_word, count + 1, 64)
 
-    def take_back_cycle(self, pc: int) -> None:
-        """Subtract the third cycle, and store its cell's address for `AccountingBoundaryCounter.third_cycle`."""
+    def subtract_third_cycle(self, pc: int) -> None:
+        """Subtract the third cycle of a RETFIE from its cell.
+
+        Store the cell's address, from which `AccountingBoundaryCounter.third_cycle` adds the cycle again.
+        """
         e, cell, word = self._e, self._cell(self._row_of(pc)), self._e.name()
         e.store(cell, e.load(cell, 64) - 1, 64)
         e.line(f"{word} = getelementptr i8, ptr {self._accounting(e)}, i64 {self._tail + 8 * RETFIE_CELL}")
@@ -281,7 +284,7 @@ class AccountingBoundaryCounter(BoundaryCounter):
 {self._log(p, f"%{p}.k3", (start, f"%{p}.where", since))}"""
 
     def third_cycle(self) -> str:
-        """Return IR that adds to the cell that `AccountingCounter.take_back_cycle` has stored."""
+        """Return IR that adds to the cell that `AccountingCounter.subtract_third_cycle` has stored."""
 
         return f"""  %c.lp = getelementptr i64, ptr %env, i64 {ACCOUNTING}
   %c.accounting = load ptr, ptr %c.lp

@@ -38,7 +38,7 @@ class ExecutionCounter(CycleCounter):
         head.line(f"%x.countword = getelementptr i64, ptr %env, i64 {ACCOUNTING}")
         head.line("%x.counts = load ptr, ptr %x.countword")
 
-    def execute(self, pc: int, times: Number = 1) -> None:
+    def count_execution(self, pc: int, times: Number = 1) -> None:
         """Count executions of the instruction at `pc`; extend the last run if this continues it."""
         if self._executed and isinstance(times, int) and times == 1:
             first, end, before = self._executed[-1]
@@ -47,17 +47,17 @@ class ExecutionCounter(CycleCounter):
                 return
         self._executed.append((pc, pc + 2, times))
 
-    def take(self, pc: int, times: Number = 1) -> None:
+    def count_taken(self, pc: int, times: Number = 1) -> None:
         """Count that the branch or skip at `pc` is taken."""
         self._taken.append((pc, times))
 
-    def settle(self) -> None:
+    def flush(self) -> None:
         """Emit the additions and clear the counts."""
-        self.store()
+        self.flush_at_exit()
         self._executed.clear()
         self._taken.clear()
 
-    def store(self) -> None:
+    def flush_at_exit(self) -> None:
         """Emit the additions; keep the counts for the rest of the block."""
         for first, end, times in self._executed:
             self._add(first >> 1, times)

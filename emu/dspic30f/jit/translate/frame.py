@@ -33,7 +33,7 @@ class FunctionFrame:
         self.b: Final = LlvmBuilder(self.e, self.v, layout, context)
         self.counter: Final[CycleCounter] = counter if counter is not None else CycleCounter()
         self.counter.begin(self.e, layout.offset)
-        self.b.before_slow = self.counter.store
+        self.b.before_slow = self.counter.flush_at_exit
         self.at = 0
         """Address of the instruction to which the passing cycles are accounted."""
         self.labels: Final[dict[int, str]] = {}
@@ -59,14 +59,14 @@ class FunctionFrame:
             self._exits[key] = label
             current = self.e.block
             self.e.start(label)
-            self.counter.store()
+            self.counter.flush_at_exit()
             self.v.leave(pc, reason)
             self.e.block = current
         return self._exits[key]
 
     def jump(self, pc: int) -> None:
         """End the block with a jump to `pc`. In exact code, leave the function if block code may exist for `pc`."""
-        self.counter.settle()
+        self.counter.flush()
         leaves = self.exact and pc in self.region.leaders
         self.e.end(f"br label %{self.exit(pc, NEXT) if leaves else self.label(pc)}")
 
@@ -101,5 +101,5 @@ class FunctionFrame:
         """
         self.v.set("cycle", self.v.get("cycle") + cycles)
         self.v.set("stall", mask)
-        self.counter.spend(self.at, cycles)
-        self.counter.execute(self.at, times)
+        self.counter.add_cycles(self.at, cycles)
+        self.counter.count_execution(self.at, times)

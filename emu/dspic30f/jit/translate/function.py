@@ -141,9 +141,9 @@ class Translator(FunctionFrame):
             skipped = self.b.select(some, whole, 0)
             self.v.set("cycle", cycle + skipped * loop.cycles)
             for address, cycles in loop.costs:
-                self.counter.spend(address, skipped * cycles)
-                self.counter.execute(address, skipped)
-            self.counter.take(back, skipped)
+                self.counter.add_cycles(address, skipped * cycles)
+                self.counter.count_execution(address, skipped)
+            self.counter.count_taken(back, skipped)
         self.jump(pc)
 
     # -- blocks -----------------------------------------------------------------------------------------------------
@@ -185,7 +185,7 @@ class Translator(FunctionFrame):
             try:
                 ended, written = self._instruction(item.step, written)
             except NeedsInterpreter:
-                self.counter.settle()
+                self.counter.flush()
                 e.end(f"br label %{self.exit(item.step.pc, INTERPRET)}")
                 self.label(item.step.next_pc)
                 return
@@ -321,7 +321,7 @@ class Translator(FunctionFrame):
         deferred = self.b.deferred
         self.advance(cycles, mask)
         if deferred.sr is not None:
-            self.counter.level_changed()
+            self.counter.select_level()
         if step.pc == self.layout.do_end:
             self._end_of_loop(step)
             return True
@@ -336,7 +336,7 @@ class Translator(FunctionFrame):
     def _continue_after_effects(self, pc: int) -> None:
         """Continue at `pc` after an instruction that may have moved the deadline or made an interrupt acceptable."""
         if self.b.deferred.deadline_moved:
-            self.counter.settle()
+            self.counter.flush()
             self.e.end(f"br label %{self.exit(pc, NEXT)}")
         elif self.b.deferred.check_interrupts:
             self._check_interrupts(pc)
@@ -358,7 +358,7 @@ class Translator(FunctionFrame):
         The sequencer handles EDT. At the end of the loop, native code leaves the function.
         """
         flow, check = self.layout.flow, self.counter.needs_check_after(self.b.deferred)
-        self.counter.settle()
+        self.counter.flush()
 
         def end(again: bool) -> None:
             self.check_changes(step.pc, self.layout.do_start if again else step.next_pc, check)
@@ -381,10 +381,10 @@ class Translator(FunctionFrame):
         e, v, skipped = self.e, self.v, self._skipped
         taken, through, join = e.fresh("taken"), e.fresh("through"), e.fresh("join")
         self.advance(cycles, mask)
-        self.counter.settle()
+        self.counter.flush()
         e.end(f"br i1 {truth(flow.cond)}, label %{taken}, label %{through}, !unpredictable !1")
         self._take(step, taken)
-        self.counter.settle()
+        self.counter.flush()
         e.end(f"br label %{join}")
         e.start(through)
         v.new_block()
@@ -396,10 +396,10 @@ class Translator(FunctionFrame):
                 if ended:  # the instruction may have made an interrupt acceptable
                     break
             else:
-                self.counter.settle()
+                self.counter.flush()
                 e.end(f"br label %{join}")
         except NeedsInterpreter:
-            self.counter.settle()
+            self.counter.flush()
             e.end(f"br label %{self.exit(self.at, INTERPRET)}")
         e.start(join)
         v.new_block()
@@ -410,9 +410,9 @@ class Translator(FunctionFrame):
         self.e.start(label)
         self.v.new_block()
         self.v.set("cycle", self.v.get("cycle") + taken_cost(step))
-        self.counter.spend(step.pc, taken_cost(step))
+        self.counter.add_cycles(step.pc, taken_cost(step))
         if step.target != step.next_pc:  # a branch to the next instruction cannot be seen to be taken
-            self.counter.take(step.pc)
+            self.counter.count_taken(step.pc)
 
     def _flow(self, step: Step, flow: Flow, cycles: Number, mask: int) -> None:
         """Translate a flow that ends the block."""
@@ -420,7 +420,7 @@ class Translator(FunctionFrame):
         if isinstance(flow, (Branch, Skip)):
             self._branch(step, flow)
             return
-        self.counter.settle()
+        self.counter.flush()
         match flow:
             case ClearWatchdog():
                 self.jump(step.next_pc)
@@ -433,7 +433,7 @@ class Translator(FunctionFrame):
             case Goto(target):
                 self._go_to(step, target)
             case Call(target):
-                self.counter.called(step.pc, target, self.v.get("W15") - 4, self.v.get("cycle"))
+                self.counter.log_call(step.pc, target, self.v.get("W15") - 4, self.v.get("cycle"))
                 self.check_changes(step.pc, target & PC_MASK, self.counter.needs_check_after(self.b.deferred))
                 self._go_to(step, target)
             case Return():
@@ -445,7 +445,7 @@ class Translator(FunctionFrame):
         """Translate a conditional branch or skip that ends the block."""
         e = self.e
         taken, other = e.fresh("taken"), e.fresh("fall")
-        self.counter.settle()
+        self.counter.flush()
         e.end(f"br i1 {truth(flow.cond)}, label %{taken}, label %{other}")
         assert step.target is not None
         self._take(step, taken)
@@ -475,12 +475,12 @@ class Translator(FunctionFrame):
                 e.store(pointer(e, self.layout.offset["events.deadline"]), 0, 64)
             cycle = self.v.get("cycle")
             self.v.set("cycle", cycle - 1)
-            self.counter.take_back_cycle(step.pc)
-            self.counter.returned(step.pc, flow.target & PC_MASK, self.v.get("W15"), cycle - 1)
+            self.counter.subtract_third_cycle(step.pc)
+            self.counter.log_return(step.pc, flow.target & PC_MASK, self.v.get("W15"), cycle - 1)
             self.v.leave(flow.target & PC_MASK, RETFIE)
             e.start(none)
             self.v.new_block()
-        self.counter.returned(step.pc, flow.target & PC_MASK, self.v.get("W15"), self.v.get("cycle"))
+        self.counter.log_return(step.pc, flow.target & PC_MASK, self.v.get("W15"), self.v.get("cycle"))
         self.v.leave(flow.target & PC_MASK, NEXT)
 
     # -- watchdog and Idle ------------------------------------------------------------------------------------------
@@ -504,7 +504,7 @@ class Translator(FunctionFrame):
     def _check_interrupts(self, next_pc: int) -> None:
         """Leave native code for the boundary if an enabled interrupt is requested, else continue at `next_pc`."""
         e = self.e
-        self.counter.settle()
+        self.counter.flush()
         some = e.fresh("some")
         e.end(f"br i1 {interrupt_requested(e, self.layout).text}, label %{some}, label %{self.label(next_pc)}")
         e.start(some)

@@ -43,7 +43,7 @@ class RepeatTranslator:
         if target is None or not self._is_native(target):
             raise NeedsInterpreter
         count, paths = flow.count, LlvmRulePaths(e, on_path=f.v.new_block)
-        f.counter.settle()
+        f.counter.flush()
         if f.exact:
             paths.each(lambda m: flow_rules.execute_repeat(m, f.layout.flow, count),
                        lambda again: self._begin(step, target, stall, again))  # fmt: skip
@@ -118,7 +118,7 @@ class RepeatTranslator:
         For an iteration that cannot be native, it leaves with the REPEAT state of that iteration.
         """
         f, e, b = self._f, self._f.e, self._f.b
-        f.counter.settle()
+        f.counter.flush()
         before, loop, done = e.fresh("before"), e.fresh("loop"), e.fresh("done")
         e.end(f"br label %{before}")
         e.start(before)
@@ -135,7 +135,7 @@ class RepeatTranslator:
         stall = b.select(left == count, 0, again) if again else 0
         b.repeating = b.left_count = None
         f.advance(cycles + stall, target.facts.writes | b.deferred.mapped_w)
-        f.counter.settle()
+        f.counter.flush()
         fewer, more = left - 1, left != 0
         first = str(count) if isinstance(count, int) else count.text
         block.lines[phi] = f"{left.text} = phi i64 [ {first}, %{before} ], [ {fewer.text}, %{e.block.label} ]"
@@ -148,7 +148,7 @@ class RepeatTranslator:
         """End the REPEAT instruction itself, then continue with the loop of its target."""
         f, e = self._f, self._f.e
         f.advance(stall + 1, step.facts.writes)
-        f.counter.settle()
+        f.counter.flush()
         if not again:
             f.jump(step.next_pc)
             return
@@ -177,7 +177,7 @@ class RepeatTranslator:
         b.commit()
         b.repeating = None
         f.advance(target.insn.row.cycles + stall, target.facts.writes | b.deferred.mapped_w)
-        f.counter.settle()
+        f.counter.flush()
         counting, check = paths.get(flow.sr) & RA, f.counter.needs_check_after(b.deferred)
 
         def end(again: bool) -> None:
