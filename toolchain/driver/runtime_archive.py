@@ -117,7 +117,7 @@ def _member(compile_one: Compile, source: Path, short_double: bool = False) -> b
         inputs=[item],
         stage="assemble",
         level=LEVEL,
-        stack_check=True,  # with -fstack-check, the library functions that a program calls must check, too
+        stack_check=True,  # a program built with -fstack-check needs library functions that check the stack limit
         runtime=False,
         clang=[
             "-std=c11" if item.language == "c" else "-std=c++17",

@@ -8,7 +8,7 @@ from toolchain.abi.names import block_label, symbol
 from toolchain.abi.sections import SECTION_ATTRIBUTES, attribute_section, is_near
 from toolchain.abi.target import NEAR_END
 from toolchain.debuginfo.metadata import DebugMetadata
-from toolchain.emit.isr import numbers, section_modifiers
+from toolchain.emit.isr import address_and_reverse, section_modifiers
 from toolchain.emit.used import KEEP
 from toolchain.ir.model import (
     BlockAddress,
@@ -45,7 +45,7 @@ def far_objects(notes: dict[str, set[str]]) -> frozenset[str]:
     return frozenset(
         name
         for name, texts in notes.items()
-        if any(what == "address" and number >= NEAR_END for what, number in numbers(texts))
+        if any(what == "address" and number >= NEAR_END for what, number in address_and_reverse(texts))
     )
 
 

@@ -120,10 +120,10 @@ def wants_probe(notes: set[str], default: bool) -> bool:
 def section_modifiers(notes: set[str]) -> str:
     """`,address(0x1000)`, `,noload`, `,reverse(64)` for a `.section` line (abi-elf.md §4.3)."""
     out = ",noload" if "noload" in notes else ""
-    return out + "".join(f",{what}(0x{number:X})" for what, number in numbers(notes))
+    return out + "".join(f",{what}(0x{number:X})" for what, number in address_and_reverse(notes))
 
 
-def numbers(notes: set[str]) -> list[tuple[str, int]]:
+def address_and_reverse(notes: set[str]) -> list[tuple[str, int]]:
     """("address" or "reverse", N) of the annotations of one object."""
     found = (re.fullmatch(r"(address|reverse)\((\d+)\)", note) for note in sorted(notes))
     return [(match[1], int(match[2])) for match in found if match is not None]

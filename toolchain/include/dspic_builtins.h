@@ -112,7 +112,7 @@ int __dspic_divf(int numerator, int denominator);
     __asm__ volatile("btg [%0],#%1" ::"r"(object), "i"(bit) : "memory");                    \
   } while (0)
 
-/* One instruction each (isa.md §6): first one from the left, from the right, position of the first bit unlike the sign. */
+/* One instruction each (isa.md §6): position of the first 1 from the left or right, and of the first non-sign bit. */
 #define __dspic_find(instruction, value)                                             \
   (__extension__({                                                                   \
     int __place;                                                                     \

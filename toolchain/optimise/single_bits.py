@@ -167,7 +167,7 @@ def _chain(v: Value) -> tuple[Value, list[Instr]]:
 
 
 def _change(v: Value, p: Value) -> BitChange | None:
-    """The change of one bit that makes `v` of the volatile object at `p`; None for any other value."""
+    """Return the BitChange if `v` is the volatile object at `p` with one bit changed, else None."""
     load, steps = _chain(v)
     if not isinstance(load, Instr) or load.op != "load" or not load.volatile or load.type is not v.type:
         return None
@@ -175,7 +175,7 @@ def _change(v: Value, p: Value) -> BitChange | None:
 
 
 def _one_bit(load: Instr, kept: int, flipped: int, steps: list[Instr]) -> BitChange | None:
-    """The change of one bit that `steps` make, which compute load & kept ^ flipped; None for another number of bits."""
+    """Return the BitChange of `steps`, applied to load & kept ^ flipped; None if they change not exactly one bit."""
     ones = (1 << load.type.bits) - 1
     for step in steps:
         k = _constant(step)
@@ -201,7 +201,7 @@ def _constant(step: Instr) -> int:
 
 
 def _choice(v: Value, p: Value) -> BitChoice | None:
-    """The two changes of one bit of the volatile object at `p` between which `v` selects; None if there are none."""
+    """Return the BitChoice if `v` selects between two changes of one bit of the object at `p`, else None."""
     root, steps = _chain(v)
     if not isinstance(root, Instr) or len(root.args) < 2:
         return None

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 import z3
 
 from toolchain.abi.target import RAM_END, RETURN_ADDRESS_BYTES
-from toolchain.proof.terms import Term, known, vector
+from toolchain.proof.terms import Term, constant_value, vector
 
 STACK = 0x1A00
 """W15 at a function's first instruction, above the return address."""
@@ -84,7 +84,7 @@ class SymbolicMemory:
 
     def read(self, address: Term | int, size: int) -> Term:
         """Return `size` bytes, the lowest first, as one vector."""
-        place = address if isinstance(address, int) else known(address)
+        place = address if isinstance(address, int) else constant_value(address)
         if place is not None:
             parts = [self.byte((place + k) & 0xFFFF) for k in range(size)]
         else:
@@ -94,7 +94,7 @@ class SymbolicMemory:
 
     def write(self, address: Term | int, value: Term) -> None:
         """Write the bytes of a vector, the lowest first."""
-        place = address if isinstance(address, int) else known(address)
+        place = address if isinstance(address, int) else constant_value(address)
         for k, part in enumerate(bytes_of(value)):
             if place is not None:
                 self.written[(place + k) & 0xFFFF] = part

@@ -17,10 +17,10 @@ WORD = 16
 HALF = 0x8000
 
 Term: TypeAlias = Any
-"""A z3 expression: the package has no types."""
+"""A z3 expression. The package z3 has no type annotations."""
 
 
-def known(term: Term) -> int | None:
+def constant_value(term: Term) -> int | None:
     """Return the value of a constant bit vector, None if it does not simplify to a constant."""
     if z3.is_bv_value(term):
         return int(term.as_long())

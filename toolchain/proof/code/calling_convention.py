@@ -20,7 +20,7 @@ from toolchain.proof.memory import STACK, StackFrame, SymbolicMemory, bytes_of, 
 from toolchain.proof.path import Event, Path
 from toolchain.proof.problem import CompiledFile
 from toolchain.proof.solver import Refuted, Undecided, check, require
-from toolchain.proof.terms import Term, known, narrow, vector, wide, word
+from toolchain.proof.terms import Term, constant_value, narrow, vector, wide, word
 from toolchain.select.calls import shape_of
 
 NUMBER: Final = re.compile(r"(?P<name>_\w+)?(?P<plus>[+-]?\d+)?")
@@ -143,7 +143,7 @@ class ConventionChecker:
 
     def _is_number(self, text: str | None, term: Term) -> bool:
         """Whether the text of an immediate operand is the expected number."""
-        wanted, found = known(term), NUMBER.fullmatch(text or "")
+        wanted, found = constant_value(term), NUMBER.fullmatch(text or "")
         if wanted is None or found is None:
             return False
         base = 0 if found["name"] is None else self.compiled.symbols.get(found["name"])
@@ -161,7 +161,7 @@ class ConventionChecker:
     def target(self, e: Event) -> Any:
         """Return the program address of a call's target, or the term of the pointer through which it calls."""
         if not isinstance(e.address, str):
-            place = known(e.address)
+            place = constant_value(e.address)
             return e.address if place is None else place
         try:
             return self.compiled.address(e.address)
@@ -274,7 +274,7 @@ class ConventionChecker:
         either: dict[int, list[Term]] = {}
         ranges = []
         for address, value in loose:
-            place = known(address)
+            place = constant_value(address)
             if place is None:
                 ranges.append((address, len(bytes_of(value))))
             else:

@@ -16,7 +16,7 @@ from toolchain.proof.memory import StackFrame
 from toolchain.proof.path import Path
 from toolchain.proof.problem import PAGE, WORD_UNITS, CompiledFile
 from toolchain.proof.solver import Refuted, Undecided, check, feasible
-from toolchain.proof.terms import Term, holds, known, vector, word
+from toolchain.proof.terms import Term, constant_value, holds, vector, word
 
 MAX_STEPS: Final = 6000
 """Greatest number of instructions on one path of the code."""
@@ -192,7 +192,7 @@ class CodeExecution:
 
     def _computed(self, state: MachineState, target: Term) -> list[MachineState]:
         """Return a state for every target of a jump through a register."""
-        place = known(target)
+        place = constant_value(target)
         if place is not None:
             return self._jump(state, place)
         out: list[MachineState] = []
@@ -215,7 +215,7 @@ class CodeExecution:
             out.append(other)
 
     def _repeat(self, state: MachineState, count: Any, pc: int) -> list[MachineState]:
-        rounds = count if isinstance(count, int) else known(word(count))
+        rounds = count if isinstance(count, int) else constant_value(word(count))
         insn = self.compiled.insn(pc)
         if rounds is None or insn is None:
             raise Undecided("REPEAT with an unknown count")

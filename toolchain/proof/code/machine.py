@@ -23,10 +23,10 @@ from toolchain.proof.terms import (
     BITS,
     SymbolicInteger,
     Term,
+    constant_value,
     holds,
     is_narrow,
     is_short,
-    known,
     lowest_bit,
     narrow,
     truth_number,
@@ -174,7 +174,7 @@ class SymbolicMachine:
         if isinstance(v, int):
             self.state.w[n] = v & (0xFFFE if n == 15 else 0xFFFF)
             return
-        place = known(v.word)
+        place = constant_value(v.word)
         self.state.w[n] = v.word if place is None else place
         if n == 15 and place is None:
             raise Undecided("W15 changes by an unknown amount")
@@ -253,7 +253,7 @@ class SymbolicMachine:
                 raise Refuted(f"reads the register at {at:#x}, where the source does not")
             if self.frame.is_private(at):
                 value = concat([self.frame_byte(at + k) for k in range(size)])
-                place = known(value)
+                place = constant_value(value)
                 return narrow(value) if place is None else place
         elif size == 2:
             require(z3.Extract(0, 0, at) == 0, self.conditions, "reads a word at an odd address")
@@ -291,7 +291,7 @@ class SymbolicMachine:
             raise Refuted(f"accesses the volatile byte at {at:#x}, where the source does not")
 
     def _place(self, ea: Any, size: int) -> Any:
-        found = ea if isinstance(ea, int) else known(ea.word)
+        found = ea if isinstance(ea, int) else constant_value(ea.word)
         if found is not None and found & (size - 1):
             raise Refuted(f"a word at the odd address {found:#x}")
         return ea.word if found is None else found
@@ -360,7 +360,7 @@ class SymbolicMachine:
 
     def _distance(self, at: Any, e: Event, size: int) -> int | None:
         """Return the byte offset of an access within the access of the event, None if it is outside."""
-        start = known(e.address)
+        start = constant_value(e.address)
         if isinstance(at, int) and start is not None:
             distance = at - start
             return distance if 0 <= distance <= e.size - size else None

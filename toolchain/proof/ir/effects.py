@@ -12,7 +12,7 @@ from toolchain.ir.model import ParameterAttributes, Value
 from toolchain.proof.ir.operands import OperandValues
 from toolchain.proof.memory import StackFrame
 from toolchain.proof.path import Event, Path
-from toolchain.proof.terms import Term, known
+from toolchain.proof.terms import Term, constant_value
 
 
 class Effects(OperandValues):
@@ -24,7 +24,7 @@ class Effects(OperandValues):
 
     def access(self, path: Path, address: Term, size: int, even: bool) -> Term:
         """Return an accessed address; assume that it is outside the private frame and, for words, even."""
-        if known(address) is None:
+        if constant_value(address) is None:
             path.assumptions.append(self.frame.avoids_private_bytes(address, size))
             path.preferences.append(z3.And(z3.UGE(address, SFR_END), z3.ULT(address, self.frame.lowest - size)))
             if size > 1 and even:

@@ -32,7 +32,7 @@ from toolchain.proof.ir.operands import SUMS, Symbolic, either
 from toolchain.proof.memory import StackFrame
 from toolchain.proof.path import Event, Path
 from toolchain.proof.solver import Undecided, feasible
-from toolchain.proof.terms import Term, known, one_bit, truth, vector
+from toolchain.proof.terms import Term, constant_value, one_bit, truth, vector
 
 MAX_VISITS: Final = 70
 """Greatest number of visits of a block on one path."""
@@ -154,7 +154,7 @@ class Evaluator(Effects):
         if i.op == "br":
             if i.blocks[0] == i.blocks[1]:
                 return [(z3.BoolVal(True), i.blocks[0])]
-            place = known(term)
+            place = constant_value(term)
             if place is not None:
                 return [(z3.BoolVal(True), i.blocks[0 if place else 1])]
             return [(truth(term), i.blocks[0]), (z3.Not(truth(term)), i.blocks[1])]
@@ -207,7 +207,7 @@ class Evaluator(Effects):
                 path.assumptions.append(z3.Not(z3.And(a == least, b == vector(-1, i.type.bits))))
             return QUOTIENTS[i.op](a, b), poison
         if i.op in SHIFTS:
-            amount = known(b)
+            amount = constant_value(b)
             if amount is None:
                 poison = either(poison, z3.UGE(b, vector(i.type.bits, i.type.bits)))
             elif amount >= i.type.bits:
@@ -227,7 +227,7 @@ class Evaluator(Effects):
 
     def _select(self, path: Path, i: Instr) -> Any:
         c, poison = self.scalar(path, i.args[0])
-        place = known(c)
+        place = constant_value(c)
         a, b = self.value(path, i.args[1]), self.value(path, i.args[2])
         if place is not None:
             return a if place else b
@@ -265,7 +265,7 @@ class Evaluator(Effects):
             term, wrong = self.scalar(path, index)
             place = self.cast("sext", (term, None), Type("int", 16))[0]
             base, poison = base + place * vector(size_of(t), 16), either(poison, wrong)
-        number = known(base)
+        number = constant_value(base)
         return (vector(number, 16) if number is not None else base), poison
 
     def _load(self, path: Path, i: Instr) -> Any:

@@ -13,7 +13,7 @@ from toolchain.proof.ir import floats
 from toolchain.proof.ir.effects import Effects
 from toolchain.proof.path import Path
 from toolchain.proof.solver import Undecided
-from toolchain.proof.terms import Term, known, one_bit, truth, vector
+from toolchain.proof.terms import Term, constant_value, one_bit, truth, vector
 
 Meaning = Callable[[Effects, Path, Instr], Any]
 MAX_BYTES: Final = 256
@@ -92,7 +92,7 @@ def _zeros(a: Term, from_top: bool) -> Term:
 def _count_zeros(from_top: bool) -> Meaning:
     def meaning(e: Effects, path: Path, i: Instr) -> Any:
         a, p = _scalar(e, path, i, 0)
-        if known(e.sure(path, i.args[1])):
+        if constant_value(e.sure(path, i.args[1])):
             zero = a == 0
             p = zero if p is None else z3.Or(p, zero)
         return _zeros(a, from_top), p
@@ -145,7 +145,7 @@ FRACTION_BITS: Final = {32: 23, 64: 52}
 
 def _is_class(e: Effects, path: Path, i: Instr) -> Any:
     """Return whether a number is in one of the classes of the mask in the second operand."""
-    (a, p), wanted = _scalar(e, path, i, 0), known(e.sure(path, i.args[1]))
+    (a, p), wanted = _scalar(e, path, i, 0), constant_value(e.sure(path, i.args[1]))
     if wanted is None:
         raise Undecided("is.fpclass of a class that is not a constant")
     bits, fraction = a.size(), FRACTION_BITS[a.size()]
@@ -195,8 +195,8 @@ def _is_even(i: Instr, n: int) -> bool:
 
 
 def _length(e: Effects, path: Path, i: Instr) -> int | None:
-    size = known(e.sure(path, i.args[2]))
-    if known(e.sure(path, i.args[3])):
+    size = constant_value(e.sure(path, i.args[2]))
+    if constant_value(e.sure(path, i.args[3])):
         raise Undecided("a volatile copy or fill")
     if size is not None and size > MAX_BYTES:
         raise Undecided(f"a copy or fill of {size} bytes")
