@@ -72,7 +72,7 @@ class BoundsRow:
 
 
 @dataclass
-class Open:
+class OpenCall:
     """A call in progress: stack pointer and cycle at its start, whether it counts, and whether its path is plain."""
 
     name: str
@@ -101,17 +101,17 @@ class CallMeter:
     structures: Structures
     worst: dict[tuple[str, bool], tuple[int, dict[str, int]]] = field(default_factory=dict)
     """Cycles of the longest run and the maxima during it, by (function, whether its path is plain)."""
-    under_way: list[Open] = field(default_factory=list)
+    under_way: list[OpenCall] = field(default_factory=list)
     watched: set[int] = field(default_factory=set)
 
-    def enter(self, name: str) -> Callable[[], bool]:
+    def entry_hook(self, name: str) -> Callable[[], bool]:
         """Return the hook for the first instruction of a function."""
 
         def hook() -> bool:
             machine = self.machine
             top = machine.w[15]
             back = machine.peek(top - 4) | (machine.peek(top - 2) & 0x7F) << 16
-            self.under_way.append(Open(name, top - CALL_BYTES, machine.cycle))
+            self.under_way.append(OpenCall(name, top - CALL_BYTES, machine.cycle))
             self.record_sizes()
             if back not in self.watched:
                 self.watched.add(back)
@@ -145,7 +145,7 @@ class CallMeter:
         self.machine.poke(NEWEST, LAST)
         return False
 
-    def tree(self, exchange: range) -> Callable[[], bool]:
+    def tree_change_hook(self, exchange: range) -> Callable[[], bool]:
         """Return the hook for an entry to a function that changes the tree. `exchange`: addresses of the function
         that swaps the reserve; a call from there is not plain."""
 
@@ -195,11 +195,11 @@ def measure(path: Path, program: Program, names: list[str], seconds: float) -> C
     for name in TREE:
         address = program.address(name)
         if address in program.calls.entries:
-            machine.hook_pc(address, meter.tree(exchange if name == "remove_hole" else range(0)))
+            machine.hook_pc(address, meter.tree_change_hook(exchange if name == "remove_hole" else range(0)))
     for name in names:
         address = program.address(name)
         assert address is not None
-        machine.hook_pc(address, meter.enter(name))
+        machine.hook_pc(address, meter.entry_hook(name))
     machine.run(seconds=seconds)
     return meter
 

@@ -27,8 +27,8 @@ from arena.trial.record import Trial
 
 Runs = Mapping[str, list[Trial]]
 SNAPSHOTS_S: Final = (0.0, 600.0)
-_KINDS: Final = "0.4"
-"""Grey of the legend's entries that belong to every run."""
+_LEGEND_GREY: Final = "0.4"
+"""Colour of the legend's entries that hold for all runs: mean, band, deviation."""
 NAMES: Final = ("snapshots", "curves", "trajectories", "cpu-load")
 
 
@@ -132,13 +132,13 @@ def curves(runs: Runs) -> Figure:
 
 
 def _legend(axis: Axes) -> list[Line2D | Patch]:
-    """Return the entries of a figure of curves: the runs, then what line, band and dashes mean where a run has them."""
+    """Return the legend of a figure of curves: the runs, then mean, band and deviation if a run has several trials."""
     runs = [line for line in axis.get_lines() if not str(line.get_label()).startswith("_")]
     if not axis.collections:
         return [*runs]
-    mean = Line2D([], [], color=_KINDS, label="mean")
-    band = Patch(color=_KINDS, alpha=0.3, linewidth=0, label="95 % band of the mean")
-    deviation = Line2D([], [], color=_KINDS, linestyle="--", linewidth=1, label="mean ± sd")
+    mean = Line2D([], [], color=_LEGEND_GREY, label="mean")
+    band = Patch(color=_LEGEND_GREY, alpha=0.3, linewidth=0, label="95 % band of the mean")
+    deviation = Line2D([], [], color=_LEGEND_GREY, linestyle="--", linewidth=1, label="mean ± sd")
     return [*runs, mean, band, deviation]
 
 

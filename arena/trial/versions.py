@@ -18,9 +18,12 @@ from typing import Final
 ROOT: Final = Path(__file__).resolve().parents[2]
 LIBRARIES: Final = ("pymunk", "numpy", "pyarrow", "llvmlite")
 """Libraries for physics, noise, the bytes of a record, and native code."""
-SHOWING: Final = ("commands/", "cli.py", "analysis/", "replay/", "studio/process.py", "campaign/bundle.py", "env.py",
-                  "README.md", "scenes/")  # fmt: skip
-"""Parts of the arena that only read records; their sources are not hashed. A scene is in the key by its values."""
+NOT_HASHED: Final = ("commands/", "cli.py", "analysis/", "replay/", "studio/process.py", "campaign/bundle.py", "env.py",
+                     "README.md", "scenes/")  # fmt: skip
+"""Parts of the arena that cannot change a record, so their sources are not hashed: readers of records, and scenes.
+
+The values of a scene are in the key of a run.
+"""
 _KINDS: Final = {".py", ".c", ".csv", ".toml"}
 
 
@@ -31,7 +34,7 @@ def sources_hash(package: str) -> str:
     folder = ROOT / package
     for path in sorted(folder.rglob("*")):
         name = path.relative_to(folder).as_posix()
-        if path.suffix not in _KINDS or (package == "arena" and name.startswith(SHOWING)):
+        if path.suffix not in _KINDS or (package == "arena" and name.startswith(NOT_HASHED)):
             continue
         digest.update(f"{name}\0".encode() + path.read_bytes().replace(b"\r\n", b"\n") + b"\0")
     return digest.hexdigest()[:16]

@@ -23,7 +23,7 @@ class Poses:
         self._begin(values, len(robots), len(headings), values.ctypes.data)
 
     def _begin(self, values: NDArray[np.float64], robots: int, polygons: int, address: int) -> None:
-        """Set the values; poses as lists are created on demand."""
+        """Store the array of numbers; the lists of poses are created when they are first read."""
         self.values = values
         """The numbers of the robots, the positions of the objects, the headings of those that are polygons."""
         self.counts = robots, (len(values) - 3 * robots - polygons) // 2, polygons

@@ -23,7 +23,7 @@ ROBOT = SENSED - 1
 
 
 def dispersion(env: ArenaEnv, genome: NDArray[np.int64], seed: int) -> float:
-    """How far robots are spread at the end of a trial: mean distance from their centre, cm."""
+    """Return how far the robots are spread at the end of a trial: mean distance from their centre, cm."""
     observed, _ = env.reset(seed=seed)
     while env.agents:
         actions = {agent: (genome[2:] if seen[ROBOT] else genome[:2]) / 100 for agent, seen in observed.items()}

@@ -34,7 +34,7 @@ def lines(path: Path) -> int:
     return sum(1 for line in path.read_text("utf-8").splitlines() if line.strip() and not COMMENT.match(line))
 
 
-def naming() -> Iterator[str]:
+def naming_files() -> Iterator[str]:
     """Yield the paths of files outside the port and its board that name it."""
     for folder in FOLDERS:
         for path in sorted((ROOT / folder).rglob("*")):
@@ -63,7 +63,7 @@ def tables() -> str:
         "",
     ]
     by_folder: dict[str, list[str]] = {}
-    for path in naming():
+    for path in naming_files():
         by_folder.setdefault(path.rpartition("/")[0], []).append(path.rpartition("/")[2])
     out += ["| folder | files |", "|---|---|"]
     out += [f"| `{folder}` | {', '.join(f'`{name}`' for name in names)} |" for folder, names in by_folder.items()]

@@ -156,7 +156,7 @@ def programs() -> Iterator[Finding]:
 
 
 def cache() -> Finding:
-    """Return the finding whether the cache is writable; without a cache all features work, but more slowly."""
+    """Return a finding: whether the cache is writable. Without a cache all features work, but more slowly."""
     folder = paths.cache()
     there = next(one for one in (folder, *folder.parents) if one.exists())
     is_open = there.is_dir() and os.access(there, os.W_OK | os.X_OK)
@@ -165,7 +165,7 @@ def cache() -> Finding:
 
 
 def trial() -> Finding:
-    """Compile, link and run one program; return the finding whether that works."""
+    """Compile, link and run one program; return a finding: whether that works."""
     with tempfile.TemporaryDirectory(prefix="openswarm-doctor-") as name:
         source, image = Path(name) / "main.c", Path(name) / "main.elf"
         source.write_text('#include <stdio.h>\nint main(void) { printf("%d", 6 * 7); return 3; }\n')

@@ -31,7 +31,7 @@ MEASURES = [
 
 
 def all_curves(samples: TrialSamples) -> Mapping[str, Floats]:
-    """Return, for the powered-on robots, the mean share of parts `done` and the share that knows the answer `right`."""
+    """Return two shares over the powered-on robots: mean share of parts `done`; robots with the answer, `right`."""
     done, best, living = last_values(samples, "done")[0], last_values(samples, "best")[0], alive(samples)
     count = np.maximum(living.sum(axis=1), 1)
     shares = np.where(living, np.nan_to_num(done), 0).sum(axis=1) / PARTS / count

@@ -63,7 +63,7 @@ class Job:
 
 
 @dataclass(frozen=True)
-class Found:
+class LinkResult:
     """Result of a run: messages sent, messages received, frames received with damage, and bits repaired in intact
     frames."""
 
@@ -82,7 +82,7 @@ class Found:
         return self.repaired / max(self.arrived * WORDS * CODE, 1)
 
 
-def measure(job: Job) -> Found:
+def measure(job: Job) -> LinkResult:
     poses = facing(job.distance, job.turned)
     robots = len(poses.robots)
     values = {"robots__count": robots, "objects__count": 0, "infrared__noise_counts": job.noise}
@@ -106,7 +106,7 @@ def measure(job: Job) -> Found:
         for source, received, again, _, bits, _, _ in struct.iter_unpack(ENTRY, entries):
             if source in numbers:
                 arrived, repaired = arrived + received - again, repaired + bits
-    return Found(sum(sent), arrived, damaged, repaired)
+    return LinkResult(sum(sent), arrived, damaged, repaired)
 
 
 def _word(machine: Machine, name: str) -> int:
@@ -165,7 +165,7 @@ def _tail(deviations: float) -> float:
     return math.erfc(deviations / math.sqrt(2)) / 2
 
 
-def keep(path: Path, jobs: list[Job], found: list[Found]) -> None:
+def keep(path: Path, jobs: list[Job], found: list[LinkResult]) -> None:
     """Write the data file: one line per run, with the columns FIELDS."""
     with path.open("w", newline="", encoding="utf-8") as file:
         lines = csv.writer(file, lineterminator="\n")

@@ -15,7 +15,7 @@ import csv
 from pathlib import Path
 from typing import Any
 
-from link import CODE, WORDS, Found, Job, expected
+from link import CODE, WORDS, Job, LinkResult, expected
 from scipy.stats import beta
 
 from arena.scene import palette
@@ -32,14 +32,14 @@ OURS, THEIRS, OTHERS = palette.BLUE, palette.VERMILION, palette.GREEN
 UNSURE = (0, (4, 2))
 
 
-def read_runs(path: Path) -> list[tuple[Job, Found]]:
+def read_runs(path: Path) -> list[tuple[Job, LinkResult]]:
     """Return the runs in a data file of link.py."""
     with path.open(newline="", encoding="utf-8") as file:
         return [
             (
                 Job(int(one["senders"]), float(one["cm"]), float(one["turned_deg"]), float(one["seconds"]),
                     float(one["noise_counts"])),
-                Found(int(one["sent"]), int(one["arrived"]), int(one["damaged"]), int(one["repaired_bits"])),
+                LinkResult(int(one["sent"]), int(one["arrived"]), int(one["damaged"]), int(one["repaired_bits"])),
             )
             for one in csv.DictReader(file)
         ]  # fmt: skip
@@ -51,21 +51,21 @@ def published_values(path: Path, system: str, what: str) -> list[float]:
         return [float(one["value"]) for one in csv.DictReader(file) if (one["system"], one["what"]) == (system, what)]
 
 
-def by_distance(runs: list[tuple[Job, Found]], senders: int) -> list[tuple[float, Job, Found]]:
+def by_distance(runs: list[tuple[Job, LinkResult]], senders: int) -> list[tuple[float, Job, LinkResult]]:
     """Return the first run of each distance with this number of senders, for robots that face each other."""
-    found = dict[float, tuple[float, Job, Found]]()
+    found = dict[float, tuple[float, Job, LinkResult]]()
     for job, one in runs:
         if job.senders == senders and not job.turned:
             found.setdefault(job.distance, (job.distance, job, one))
     return [found[distance] for distance in sorted(found)]
 
 
-def throughput(job: Job, one: Found) -> float:
+def throughput(job: Job, one: LinkResult) -> float:
     """Return the received payload in bit/s."""
     return one.arrived * MESSAGE_BITS / job.seconds
 
 
-def our_range(runs: list[tuple[Job, Found]]) -> float:
+def our_range(runs: list[tuple[Job, LinkResult]]) -> float:
     """Return our range in cm, interpolated between the last distance at which RANGE_SHARE arrives and the next one."""
     alone = by_distance(runs, 1)
     last = max(number for number, (_, _, one) in enumerate(alone) if one.share >= RANGE_SHARE)
@@ -78,7 +78,7 @@ def interval(found: int, of: int) -> tuple[float, float]:
     return float(beta.ppf(0.025, found, of - found + 1)), float(beta.ppf(0.975, found + 1, of - found))
 
 
-def draw_errors(axes: Any, runs: list[tuple[Job, Found]], reach: float, factor: float) -> None:
+def draw_errors(axes: Any, runs: list[tuple[Job, LinkResult]], reach: float, factor: float) -> None:
     alone = [(cm, one) for cm, _, one in by_distance(runs, 1) if one.arrived]
     noise = runs[0][0].noise
     seen = [(cm, one.bit_errors) for cm, one in alone if one.repaired]
@@ -100,7 +100,7 @@ def draw_errors(axes: Any, runs: list[tuple[Job, Found]], reach: float, factor: 
     axes.set_title("Bit errors over distance")
 
 
-def draw_throughput(axes: Any, runs: list[tuple[Job, Found]], data: Path, reach: float) -> None:
+def draw_throughput(axes: Any, runs: list[tuple[Job, LinkResult]], data: Path, reach: float) -> None:
     for senders, mark, name in ((1, "o-", "ours, one sends"), (2, "o:", "ours, both send, sum")):
         found = [(cm, throughput(job, one)) for cm, job, one in by_distance(runs, senders)]
         axes.plot(*zip(*found, strict=True), mark, color=OURS, mfc="none" if senders == 2 else OURS, label=name)
@@ -115,7 +115,7 @@ def draw_throughput(axes: Any, runs: list[tuple[Job, Found]], data: Path, reach:
     axes.set_title("Throughput; theirs: as the protocol gives, any range")
 
 
-def draw_angle(axes: Any, runs: list[tuple[Job, Found]]) -> None:
+def draw_angle(axes: Any, runs: list[tuple[Job, LinkResult]]) -> None:
     """Draw the share of received frames over the bearing of the light: a robot that is turned by 90 degrees receives
     on its left."""
     cm = next(job.distance for job, _ in runs if job.turned)
@@ -128,7 +128,7 @@ def draw_angle(axes: Any, runs: list[tuple[Job, Found]]) -> None:
     axes.set(xticks=range(0, 361, 60), title="By angle; SwarmCom, libIrcom: none published")
 
 
-def draw_ratios(axes: Any, runs: list[tuple[Job, Found]], data: Path, reach: float) -> None:
+def draw_ratios(axes: Any, runs: list[tuple[Job, LinkResult]], data: Path, reach: float) -> None:
     best = max(throughput(job, one) for _, job, one in by_distance(runs, 1))
     rates = published_values(data, "libIrcom", "payload rate")
     errors = published_values(data, "SwarmCom", "bit error rate over libIrcom's")
@@ -144,7 +144,7 @@ def draw_ratios(axes: Any, runs: list[tuple[Job, Found]], data: Path, reach: flo
     axes.set_title("Against libIrcom, as published")
 
 
-def draw(path: Path, runs: list[tuple[Job, Found]], data: Path) -> None:
+def draw(path: Path, runs: list[tuple[Job, LinkResult]], data: Path) -> None:
     import matplotlib
 
     matplotlib.use("Agg")

@@ -43,7 +43,7 @@ WARM_S = 0.5
 
 
 @dataclass(frozen=True)
-class Found:
+class SwarmResult:
     """Result for a swarm.
 
     Robots, mean number of robots in reach, messages sent, possible receptions in reach, receptions in reach, receptions
@@ -75,7 +75,7 @@ def grid(robots: int) -> Poses:
     )
 
 
-def measure(robots: int, seconds: float, noise: float) -> Found:
+def measure(robots: int, seconds: float, noise: float) -> SwarmResult:
     poses = grid(robots)
     values = {"robots__count": robots, "objects__count": 0, "infrared__noise_counts": noise}
     scene = load_scene("clustering").with_values(**values)
@@ -107,7 +107,7 @@ def measure(robots: int, seconds: float, noise: float) -> Found:
             new = received - again
             arrived, beyond = (arrived + new, beyond) if other in near else (arrived, beyond + new)
             twice, total, most = twice + again, total + ms - received * late, max(most, longest - late)
-    return Found(
+    return SwarmResult(
         robots, pairs / robots, sum(sent), possible, arrived, beyond, twice, total / max(arrived + beyond + twice, 1),
         most, digest.hexdigest(),
     )  # fmt: skip
