@@ -323,3 +323,17 @@ def test_a_timer_that_stops_in_idle_goes_on_behind_it() -> None:
     assert counts[0] == counts[1]
     assert 500 < counts[0] < 8_000
     assert not difference(plain, native)
+
+
+def test_a_request_below_the_priority_ends_idle_in_the_same_cycle() -> None:
+    """isa.md §11: a request that is no exception at the CPU's priority ends Idle; execution continues in the cycle of
+    the interpreter."""
+    sfrs = (("PR1", 99), ("IPC0", 0x4444), ("IEC0", 8), ("T1CON", 0x8000), ("SR", 0xE0))
+    firmware, at = started({2: 0, 15: 0x900}, sfrs)
+    at = firmware.put(at, words_of("PWRSAV #lit1", k=1) + words_of("BCLR{.B} f, #bit4", f=0x84, b=3))
+    firmware.put(at, words_of("INC{.B} Ws, Wd", B=0, s=2, p=0, d=2, q=0) + words_of("BRA Expr", n=-4))
+    plain, native = pair(firmware)
+    for machine in (plain, native):
+        machine.run(10_000)
+    assert plain.w[2] > 90
+    assert not difference(plain, native)
