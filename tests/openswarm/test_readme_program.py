@@ -16,6 +16,8 @@ ROOT = Path(__file__).resolve().parents[2]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 MAKE, PROJECT = re.findall(r"```sh\n(.*?)```", README, re.DOTALL)
 """The two blocks of commands."""
+TURN = "0.5s selector 5\n"
+"""The stimulus of the README's program."""
 
 
 def in_fresh_shell(script: str, folder: Path, home: Path) -> subprocess.CompletedProcess[str]:
@@ -54,7 +56,7 @@ def test_the_program_blinks_and_drives(tmp_path: Path, capsys: pytest.CaptureFix
     (program,) = re.findall(r"```c\n(.*?)```", README, re.DOTALL)
     (tmp_path / "src").mkdir()
     (tmp_path / "src" / "main.c").write_text(program)
-    (tmp_path / "turn.txt").write_text("0.5s selector 5\n")
+    (tmp_path / "turn.txt").write_text(TURN)
     words = ["make", "-s", "-C", str(ROOT / "firmware"), f"APPS={tmp_path}", "APP=src", f"OUT={tmp_path / 'build'}",
              f"PYTHON={sys.executable}"]  # fmt: skip
     subprocess.run(words, check=True, capture_output=True)
@@ -64,7 +66,9 @@ def test_the_program_blinks_and_drives(tmp_path: Path, capsys: pytest.CaptureFix
     seen = capsys.readouterr().err
     assert len(re.findall(r"leds (?:body|off)", seen)) >= 4, seen
     assert re.search(r"motors [1-9]\d* 0 steps in total", seen), seen
-    command, *printed = re.findall(r"```text\n(.*?)```", README, re.DOTALL)[0].splitlines()
-    assert "--watch leds,motors --stimulus turn.txt" in command
+    build, stimulus, command, *printed = re.findall(r"```text\n(.*?)```", README, re.DOTALL)[0].splitlines()
+    assert build == "$ make -s -C build/myrobot"
+    assert stimulus == f"$ echo '{TURN.strip()}' >turn.txt"
+    assert command.startswith("$ emu run build/myrobot/build/firmware.elf --watch leds,motors --stimulus turn.txt")
     assert printed
     assert [line for line in printed if line not in seen.splitlines()] == []
