@@ -49,7 +49,7 @@ class OutputMatcher:
         stop: Any = None
         while (found := wanted.search(self.received, self.position)) is None:
             if self._now() >= end or (stop is not None and stop.reason not in ("limit", "interrupted")):
-                raise ExpectError(self._failure_message(wanted, within, stop))
+                raise ExpectError(self._failure_message(pattern, within, stop))
             self._pattern = wanted
             try:
                 stop = self._wires.run(end - self._now())
@@ -60,19 +60,25 @@ class OutputMatcher:
         self.position = found.end()
         return found
 
-    def _failure_message(self, wanted: re.Pattern[bytes], within: float, stop: Any) -> str:
+    def _failure_message(self, pattern: Pattern, within: float, stop: Any) -> str:
         output = bytes(self.received[self.position :])
         quoted = repr(output[-QUOTED_BYTES:])[1:] + (
             f" (the last {QUOTED_BYTES} of {len(output)} bytes)" if len(output) > QUOTED_BYTES else ""
         )
-        text = f"{self._name} did not send {wanted.pattern!r} within {within:g} ms; it sent {quoted}"
+        wanted = pattern.pattern if isinstance(pattern, re.Pattern) else literal_bytes(pattern)
+        text = f"{self._name} did not send {wanted!r} within {within:g} ms; it sent {quoted}"
         if stop is not None and stop.fault is not None:
             return f"{text}\n{stop.fault.report()}"
         return text + (f"; the run ended: {stop.reason}" if stop is not None and stop.reason != "limit" else "")
+
+
+def literal_bytes(text: str | bytes) -> bytes:
+    """Return the bytes of a text; characters are Latin-1."""
+    return text.encode("latin-1") if isinstance(text, str) else bytes(text)
 
 
 def compile_pattern(pattern: Pattern) -> re.Pattern[bytes]:
     """Return a regular expression. Text and bytes match literally; a compiled pattern is returned unchanged."""
     if isinstance(pattern, re.Pattern):
         return pattern
-    return re.compile(re.escape(pattern.encode("latin-1") if isinstance(pattern, str) else bytes(pattern)))
+    return re.compile(re.escape(literal_bytes(pattern)))

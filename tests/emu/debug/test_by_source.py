@@ -301,6 +301,8 @@ def test_expect_continues_after_the_last_match_and_stops_at_the_byte(build):
     with pytest.raises(ExpectError, match=r"UART1 did not send b'ready' within 5 ms; it sent 'dy -31057"):
         machine.uart[1].expect("ready", within=5)
     machine.uart[1].expect("done", within=5)
+    with pytest.raises(ExpectError, match=r"did not send b'a b\.\\r\\n' within"):  # the text as the caller wrote it
+        machine.uart[1].expect("a b.\r\n", within=1)
     with pytest.raises(ExpectError, match="the run ended: halt"):
         machine.uart[1].expect("never", within=50)
 
