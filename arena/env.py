@@ -5,6 +5,7 @@ World, sensors and supervisor are those of a trial. Equal seeds and actions give
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -59,10 +60,10 @@ class ArenaEnv(ParallelEnv):  # type: ignore[misc]
     """Environment of `scene`, which is a name, a path or a value.
 
     An action holds for `decision_s` seconds: speeds of the left and right wheel, in -1..1 of 12.8 cm/s. The reward is
-    equal for all robots: the increase of the experiment's first metric, or `reward(stage)`. With `image` the robots run
-    firmware, and `command` translates each action into a Bluetooth message. An episode is truncated after `seconds`
-    simulated seconds and terminated by the experiment's `done`. With `render_mode="rgb_array"`, `render` returns a
-    picture of the arena from above.
+    equal for all robots: the increase of the experiment's first metric, or `reward(supervisor)`. With `image` the
+    robots run firmware, and `command` translates each action into a Bluetooth message. An episode is truncated after
+    `seconds` simulated seconds and terminated by the experiment's `done`. With `render_mode="rgb_array"`, `render`
+    returns a picture of the arena from above.
 
         >>> from arena.env import ArenaEnv
         >>> env = ArenaEnv("aggregation", seconds=1.0)
@@ -75,7 +76,7 @@ class ArenaEnv(ParallelEnv):  # type: ignore[misc]
         False
 
     A pickled or copied environment repeats its episode from the seed and the actions, which gives the same numbers;
-    changes by `stage` are not repeated.
+    changes by `supervisor` are not repeated.
 
     Raises SceneError, emu.LoadError, ValueError.
     """
@@ -216,14 +217,26 @@ class ArenaEnv(ParallelEnv):  # type: ignore[misc]
         return _repeated, (self.scene, self._settings, self._next_seed, self._has_begun, self._taken)
 
     @property
-    def stage(self) -> Supervisor:
+    def supervisor(self) -> Supervisor:
         """Supervisor of the running trial, to read and change its world. Call `reset` first."""
         return self._hooks.supervisor
 
     @property
-    def brains(self) -> list[Controller]:
+    def stage(self) -> Supervisor:
+        """Old spelling of `supervisor`, which this release still accepts."""
+        warnings.warn("ArenaEnv.stage is called supervisor now", DeprecationWarning, stacklevel=2)
+        return self.supervisor
+
+    @property
+    def controllers(self) -> list[Controller]:
         """Controllers of the robots, in order."""
         return self._controllers
+
+    @property
+    def brains(self) -> list[Controller]:
+        """Old spelling of `controllers`, which this release still accepts."""
+        warnings.warn("ArenaEnv.brains is called controllers now", DeprecationWarning, stacklevel=2)
+        return self.controllers
 
     def senses(self, agent: str) -> Senses:
         """Return what an agent senses now, as the controller of a trial gets it. Call `reset` first."""

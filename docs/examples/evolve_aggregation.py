@@ -28,7 +28,7 @@ def dispersion(env: ArenaEnv, genome: NDArray[np.int64], seed: int) -> float:
     while env.agents:
         actions = {agent: (genome[2:] if seen[ROBOT] else genome[:2]) / 100 for agent, seen in observed.items()}
         observed, *_ = env.step(actions)
-    places = env.stage.robots[:, :2]
+    places = env.supervisor.robots[:, :2]
     return float(np.hypot(*(places - places.mean(axis=0)).T).mean())
 
 

@@ -72,6 +72,16 @@ def test_a_pickled_environment_continues_as_the_original() -> None:
     assert len(np.unique(picture.reshape(-1, 3), axis=0)) > 3
 
 
+def test_old_spellings_are_accepted_with_a_warning() -> None:
+    """`stage` and `brains` are the properties `supervisor` and `controllers`, and warn."""
+    env = ArenaEnv("aggregation", seconds=1.0)
+    env.reset(seed=1)
+    with pytest.warns(DeprecationWarning, match="called supervisor now"):
+        assert env.stage is env.supervisor
+    with pytest.warns(DeprecationWarning, match="called controllers now"):
+        assert env.brains is env.controllers
+
+
 def test_the_render_mode_is_checked() -> None:
     """Only pictures as arrays exist; `render` without a mode is refused."""
     with pytest.raises(ValueError, match="render_mode = 'human': expected None or 'rgb_array'"):
@@ -110,13 +120,13 @@ def test_robots_sense_what_stands_before_them_and_move_as_told() -> None:
     scene = load_scene("foraging").with_values(robots__wheel_noise=0.0, clock__scripted_quantum_ms=10.0)
     env = ArenaEnv(scene, seconds=5.0, decision_s=0.5)
     env.reset(seed=1)
-    env.stage.move_robot(0, 100, 75, 0.0)
-    env.stage.move_robot(1, 130, 75, math.pi)
-    env.stage.move_robot(2, 10, 20, math.pi + math.radians(18))
+    env.supervisor.move_robot(0, 100, 75, 0.0)
+    env.supervisor.move_robot(1, 130, 75, math.pi)
+    env.supervisor.move_robot(2, 10, 20, math.pi + math.radians(18))
     for number in range(6):
-        env.stage.move_object(number, 180, 10 + 20 * number)
+        env.supervisor.move_object(number, 180, 10 + 20 * number)
     observed, rewards, over, late, _ = env.step({"robot_0": np.array([1, 1]), "robot_1": np.array([0.5, -0.5])})
-    assert env.stage.robots[0, 0] == pytest.approx(106.4, abs=0.2)
+    assert env.supervisor.robots[0, 0] == pytest.approx(106.4, abs=0.2)
     seen = observed["robot_0"]
     assert seen.shape == (SIZE,)
     assert seen[:SENSED].argmax() == ROBOT
@@ -124,8 +134,8 @@ def test_robots_sense_what_stands_before_them_and_move_as_told() -> None:
     assert observed["robot_2"][SENSED] > 0.03  # sensor 0 faces the wall at 6.3 cm
     assert observed["robot_2"][SENSED + 8 :][:8].min() < 0.9  # a sensor that faces the lamp
     assert (sum(rewards.values()), any(over.values()), any(late.values())) == (0.0, False, False)
-    env.stage.move_robot(1, 20, 140, 0.0)
-    env.stage.move_object(0, 130, 75)
+    env.supervisor.move_robot(1, 20, 140, 0.0)
+    env.supervisor.move_object(0, 130, 75)
     observed, *_ = env.step({})
     assert observed["robot_0"][:SENSED].argmax() == OBJECT
 
@@ -134,13 +144,13 @@ def test_food_brought_home_is_a_reward() -> None:
     """The reward is the delivered food, which is the experiment's first metric; the supervisor acts as in a trial."""
     env = ArenaEnv("foraging", seconds=5.0, decision_s=0.2)
     env.reset(seed=1)
-    env.stage.move_object(0, 100, 75)
-    env.stage.move_robot(0, 100 - 7, 75, 0.0)
+    env.supervisor.move_object(0, 100, 75)
+    env.supervisor.move_robot(0, 100 - 7, 75, 0.0)
     env.step({})
-    env.stage.move_robot(0, 40, 75)
+    env.supervisor.move_robot(0, 40, 75)
     _, rewards, *_ = env.step({})
     assert set(rewards.values()) == {1.0}
-    mine = ArenaEnv("foraging", seconds=1.0, reward=lambda stage: stage.seconds)
+    mine = ArenaEnv("foraging", seconds=1.0, reward=lambda supervisor: supervisor.seconds)
     mine.reset(seed=1)
     assert mine.step({})[1]["robot_0"] == pytest.approx(0.1, abs=0.01)
 
@@ -160,7 +170,7 @@ def test_an_action_that_is_not_two_finite_numbers_is_refused(action: object) -> 
             with pytest.raises(ValueError, match=r"action of robot_3: .*: expected two finite numbers"):
                 env.step({"robot_0": np.array([1, 1]), "robot_3": action})  # type: ignore[dict-item]
         observed, rewards, *_ = env.step({agent: np.array([2.0, -3.0]) for agent in env.agents})
-        episodes.append((np.stack(list(observed.values())), rewards, env.stage.robots))
+        episodes.append((np.stack(list(observed.values())), rewards, env.supervisor.robots))
     (first, gain, poses), (second, other_gain, other_poses) = episodes
     assert np.isfinite(first).all()
     assert (first == second).all()
@@ -175,7 +185,7 @@ def test_robots_with_firmware_are_told_by_bluetooth(assembled: Callable[[str], P
     env.reset(seed=1)
     env.step({agent: np.array([0.5, -0.25]) for agent in env.agents})
     env.step({})
-    for controller in env.brains:
+    for controller in env.controllers:
         controller.reading()
         assert [line.text for line in controller.take_lines()] == ["D,500,-250", "D,0,0"]
     assert serial_command(1, -1) == b"D,1000,-1000\r"
