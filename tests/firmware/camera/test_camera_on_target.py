@@ -10,9 +10,9 @@ import pytest
 from emu.boards.picture import write_picture
 from emu.cli import main
 from emu.machine.machine import Machine
+from tests.firmware.capture_sweep import capture_at, expected_line, start, sweep
 from tests.firmware.conftest import TARGET_APPS, Build
 from tests.firmware.drivers.test_drivers_on_target import FCY, PROGRAMS, SCENES, START, TABLES, plain, robot
-from tests.firmware.sights import capture_at, expected_line, start, sweep
 from tests.fuzz.seeds import base_seed
 
 
@@ -27,7 +27,7 @@ def test_lines_are_right_wherever_href_falls_in_a_kernel_call(image: Build) -> N
     The test samples every 199th cycle of a round of all calls, without or with IPL slip, from a cycle that the commit
     determines; fuzz_camera.py samples all cycles.
     """
-    machine = start(image("sights", TARGET_APPS), noise(), ipl_slip=base_seed() % 2)
+    machine = start(image("capture", TARGET_APPS), noise(), ipl_slip=base_seed() % 2)
     assert sweep(machine, noise(), stride=199, phase=base_seed() % 199) > 130
 
 
@@ -37,7 +37,7 @@ def test_a_capture_that_comes_late_spoils_the_line(image: Build) -> None:
 
     A byte is valid for 8 Tcy, and the driver reads it 16-18 Tcy after HREF (epuck.md §7.5).
     """
-    machine = start(image("sights", TARGET_APPS), noise())
+    machine = start(image("capture", TARGET_APPS), noise())
     state, expected = machine.snapshot(), expected_line(noise())
     assert np.array_equal(capture_at(machine, state, 0), expected)
     assert not np.array_equal(capture_at(machine, state, 0, masked=8), expected)

@@ -19,7 +19,7 @@ import numpy as np
 ROOT = Path(__file__).resolve().parents[3]
 sys.path.insert(0, str(ROOT))
 
-from tests.firmware.sights import start, sweep  # noqa: E402
+from tests.firmware.capture_sweep import start, sweep  # noqa: E402
 from tests.fuzz.seeds import Campaign, parser  # noqa: E402
 
 SPARSE = 499
@@ -33,7 +33,7 @@ def main() -> int:
     stride = options.stride or (1 if options.seconds is None else SPARSE)
     tried = 0
     with tempfile.TemporaryDirectory() as folder:
-        words = ["APP=sights", "APPS=../tests/firmware/target", f"OUT={folder}", f"PYTHON={sys.executable}"]
+        words = ["APP=capture", "APPS=../tests/firmware/target", f"OUT={folder}", f"PYTHON={sys.executable}"]
         subprocess.run(["make", "-s", "-C", str(ROOT / "firmware"), *words], check=True)
         for seed in campaign:
             picture = np.random.default_rng(seed).integers(0, 256, (480, 640, 3), dtype=np.uint8)

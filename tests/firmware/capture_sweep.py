@@ -1,6 +1,6 @@
 """HREF of the camera at every cycle of a round of kernel calls (kernel.md §4).
 
-A round of tests/firmware/target/sights makes every call of the kernel and its devices while the clock, slices,
+A round of tests/firmware/target/capture makes every call of the kernel and its devices while the clock, slices,
 stepper, UARTs, converter, I2C and remote control interrupt. `sweep` executes the round by instructions. From a copy
 of each state it raises HREF at each cycle of the instruction and compares the captured line.
 """
@@ -34,7 +34,7 @@ IDLE_STRIDE = 61
 
 
 def start(path: Path, picture: np.ndarray, ipl_slip: int = 0) -> Machine:
-    """Return the machine at the start of a round of the sights firmware, with the camera programmed."""
+    """Return the machine at the start of a round of the firmware `capture`, with the camera programmed."""
     image = load_image(path)
     machine = Machine(image.chip, engine="auto", ipl_slip=ipl_slip, board=partial(Epuck, selector=3))
     machine.load(image)

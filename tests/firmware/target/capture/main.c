@@ -1,5 +1,5 @@
 /* A round in which a thread makes every call of openswarm.h and openswarm_io.h while all devices run. The tests place
- * the camera's HREF on each cycle of the round (tests/firmware/sights.py). */
+ * the camera's HREF on each cycle of the round (tests/firmware/capture_sweep.py). */
 #include <analog.h>
 #include <bluetooth.h>
 #include <camera.h>
