@@ -136,7 +136,11 @@ class _SceneBodies:
         ))  # fmt: skip
         sensor_classes = appearance.sensor_classes if appearance is not None else range(len(COLOURS))
         self.sensor_classes: Final = np.array(sensor_classes, dtype=np.uint8)
-        self.robot: Final = appearance.robot if appearance is not None else ROBOT
+        robot = appearance.robot if appearance is not None else ROBOT
+        kinds = map(scene.robot_kind, range(scene.robots.count))
+        self.robots: Final = (_Disc * scene.robots.count)(*(
+            _Disc(0.0, 0.0, kind.radius_cm, kind.height_cm, robot) for kind in kinds
+        ))  # fmt: skip
         self.led_positions: Final = (_Led * len(LED_POSITIONS))(*(_Led(*one) for one in LED_POSITIONS))
         self.led_classes: Final = led_classes(scene)
 
@@ -185,10 +189,7 @@ class Renderer:
         self._bodies: Final = bodies
         self.leds: Final = np.zeros(scene.robots.count, dtype=np.int64)
         """Lit LEDs of each robot, bit n: ring LED n, 8 front, 9 body; used in scenes with `camera.sees_leds`."""
-        kinds = map(scene.robot_kind, range(scene.robots.count))
-        self._robot_discs: Final = (_Disc * scene.robots.count)(*(
-            _Disc(0.0, 0.0, kind.radius_cm, kind.height_cm, bodies.robot) for kind in kinds
-        ))  # fmt: skip
+        self._robot_discs: Final = type(bodies.robots).from_buffer_copy(bodies.robots)
         self._discs: Final = (_Disc * (len(bodies.objects) + scene.robots.count))()
         self._sides: Final = (_Side * (len(bodies.outlines) + sum(map(len, bodies.polygon_corners))))()
         self._view: Final = _View(
