@@ -35,81 +35,87 @@ Levels = tuple[float, ...]
 class Receivers(Structure):
     """`struct receivers` of light.c."""
 
-    _fields_ = [("tau", c_double), ("settled", c_int64)]
+    _fields_ = [("tau", c_double), ("settled", c_int64), ("gap", c_double)]
 
 
 class _History(Structure):
     """`struct history` of light.c."""
 
-    _fields_ = [("cycles", c_void_p), ("begun", c_void_p), ("lit", c_void_p), ("count", c_int64),
-                ("cached_at", c_int64), ("cached", c_double * LINES)]  # fmt: skip
+    _fields_ = [*((name, c_void_p) for name in ("cycles", "begun", "levels", "lit")), ("room", c_int64),
+                ("count", c_int64)]  # fmt: skip
+    count: int
+
+
+class Emission(Structure):
+    """`struct emission` of light.c."""
+
+    _fields_ = [("history", c_void_p), ("receivers", c_void_p), ("on_at", c_int64)]
 
 
 @cache
 def light_code() -> dict[str, Callable[..., Any]]:
     """Return the functions of light.c."""
     return functions(Path(__file__).with_name("light.c"), {
+        "append": (INT, (ADDRESS, ADDRESS, INT, INT, INT)),
+        "changes_by": (INT, (ADDRESS, INT)),
+        "emit": (INT, (ADDRESS, INT, INT, INT)),
+        "is_dark": (INT, (ADDRESS, ADDRESS, INT, INT)),
         "levels": (None, (ADDRESS, ADDRESS, INT, ADDRESS)),
         "light": (DOUBLE, (ADDRESS, INT, INT)),
+        "sense": (None, (ADDRESS, INT)),
+        "begin_quantum": (INT, (ADDRESS, ADDRESS, INT)),
     })  # fmt: skip
 
 
 class EmitterHistory:
     """Recent changes of a robot's pulse lines, in memory that native code reads (`struct history`)."""
 
-    def __init__(self, cycles: Sequence[int] = (), begun: Sequence[int] = (), lit: Sequence[int] = (0,)) -> None:
+    def __init__(
+        self, cycles: Sequence[int] = (), begun: Sequence[int] = (), levels: Sequence[float] = (),
+        lit: Sequence[int] = (0,),
+    ) -> None:  # fmt: skip
         """Create a history.
 
-        `begun`: per change the cycle at which its transmission began. `lit`: the lit lines before the first change and
-        after each.
+        `begun`: per change the cycle at which its transmission began. `levels`: for each change the levels of all lines
+        at its cycle. `lit`: the lit lines before the first change and after each.
         """
-        self._history: Final = _History(cached_at=-1)
+        self._history: Final = _History()
         self.address: Final = addressof(self._history)
-        self._allocate(max(_ROOM, len(cycles)), cycles, begun, lit)
+        self._allocate(max(_ROOM, 2 * len(cycles)), cycles, begun, levels, lit)
 
-    def _allocate(self, room: int, cycles: Sequence[int], begun: Sequence[int], lit: Sequence[int]) -> None:
+    def _allocate(
+        self, room: int, cycles: Sequence[int], begun: Sequence[int], levels: Sequence[float], lit: Sequence[int]
+    ) -> None:
         """Allocate room for `room` changes and copy these into it."""
-        self.cycles: Array[c_int64] = (c_int64 * room)(*cycles)
+        self._cycles: Array[c_int64] = (c_int64 * room)(*cycles)
         self._begun: Array[c_int64] = (c_int64 * room)(*begun)
+        self._levels: Array[c_double] = (c_double * (LINES * room))(*levels)
         self._lit: Array[c_uint8] = (c_uint8 * (room + 1))(*lit)
-        self.count = len(cycles)
         history = self._history
-        history.cycles, history.begun = addressof(self.cycles), addressof(self._begun)
-        history.lit, history.count = addressof(self._lit), self.count
+        history.cycles, history.begun = addressof(self._cycles), addressof(self._begun)
+        history.levels, history.lit = addressof(self._levels), addressof(self._lit)
+        history.room, history.count = room, len(cycles)
 
-    def _since(self, first: int) -> tuple[list[int], list[int], list[int]]:
+    def _since(self, first: int) -> tuple[list[int], list[int], list[float], list[int]]:
         """Return the changes from number `first` on, as arguments of `__init__`."""
-        return self.cycles[first : self.count], self._begun[first : self.count], self._lit[first : self.count + 1]
+        kept = slice(first, self.count)
+        levels = self._levels[LINES * first : LINES * self.count]
+        return self._cycles[kept], self._begun[kept], levels, self._lit[first : self.count + 1]
 
-    def __reduce__(self) -> tuple[type[EmitterHistory], tuple[list[int], list[int], list[int]]]:
+    def __reduce__(self) -> tuple[type[EmitterHistory], tuple[list[int], list[int], list[float], list[int]]]:
         """Copy and pickle by value: the addresses are valid in one process only."""
         return EmitterHistory, self._since(0)
 
     @property
-    def lit(self) -> int:
-        """Bit n: line n is lit after the last change."""
-        return self._lit[self.count]
+    def count(self) -> int:
+        """Number of changes that are kept."""
+        return self._history.count
 
-    def changes_by(self, cycle: int) -> int:
-        """Return the number of changes at or before a cycle."""
-        return bisect_right(self.cycles, cycle, 0, self.count)
-
-    def lit_after(self, count: int) -> int:
-        """Return the lit lines after `count` changes; bit n: line n."""
-        return self._lit[count]
-
-    def add(self, cycle: int, line: int, lit: bool, needed_from: int) -> None:
+    def add(self, receivers: Receivers, cycle: int, line: int, lit: bool, needed_from: int) -> None:
         """Append a change. Changes before cycle `needed_from` can be dropped."""
-        count, before = self.count, self._lit[self.count]
-        if count == len(self.cycles):
-            dropped = max(self.changes_by(needed_from) - 1, 0)
-            self._allocate(max(_ROOM, 2 * (count - dropped)), *self._since(dropped))
-            count = self.count
-        is_new = not count or (not before and cycle - self.cycles[count - 1] > GAP_S * FCY)
-        self.cycles[count] = cycle
-        self._begun[count] = cycle if is_new else self._begun[count - 1]
-        self._lit[count + 1] = before | 1 << line if lit else before & ~(1 << line)
-        self.count = self._history.count = count + 1
+        if not light_code()["append"](self.address, addressof(receivers), cycle, line, lit):
+            dropped = max(light_code()["changes_by"](self.address, needed_from) - 1, 0)
+            self._allocate(max(_ROOM, 2 * (self.count - dropped)), *self._since(dropped))
 
 
 @dataclass
@@ -132,7 +138,7 @@ class OpticalChannel:
         self._emitters = [EmitterHistory() for _ in range(self.robots)]
         self._led_cycles = [[] for _ in range(self.robots)]
         self._leds = [[0] for _ in range(self.robots)]
-        self.receivers = Receivers(self.tau, round(SETTLED * self.tau))
+        self.receivers = Receivers(self.tau, round(SETTLED * self.tau), GAP_S * FCY)
 
     @classmethod
     def of(cls, scene: Scene) -> OpticalChannel:
@@ -148,7 +154,7 @@ class OpticalChannel:
         """Switch a pulse line of a robot, or from number `LINES` on one of its LEDs."""
         needed_from = min(cycle, self.horizon) - 4 * self.quantum - 2 * int(self.receivers.settled)
         if line < LINES:
-            self._emitters[robot].add(cycle, line, lit, needed_from)
+            self._emitters[robot].add(self.receivers, cycle, line, lit, needed_from)
             return
         cycles, leds, led = self._led_cycles[robot], self._leds[robot], line - LINES
         state = leds[-1] | 1 << led if lit else leds[-1] & ~(1 << led)
@@ -160,6 +166,10 @@ class OpticalChannel:
     def emitter(self, robot: int) -> EmitterHistory:
         """Return the history of a robot's pulse lines."""
         return self._emitters[robot]
+
+    def emitter_addresses(self) -> Array[c_void_p]:
+        """Return the host addresses of all robots' histories."""
+        return (c_void_p * len(self._emitters))(*(one.address for one in self._emitters))
 
     def levels(self, robot: int, cycle: int) -> Levels:
         """Return the response of other robots' receivers to a robot's pulse lines at a cycle of the trial.
@@ -177,9 +187,5 @@ class OpticalChannel:
 
     def is_dark(self, robot: int, first: int, last: int) -> bool:
         """Whether others receive no light of a robot from cycle `first` to `last`."""
-        emitter, count = self._emitters[robot], self._emitters[robot].count
-        settled_by = first - self.delay - self.receivers.settled
-        if not emitter.lit and (not count or emitter.cycles[count - 1] <= settled_by):
-            return True  # the most frequent case
-        index = emitter.changes_by(last - self.delay)
-        return not emitter.lit_after(index) and (not index or emitter.cycles[index - 1] <= settled_by)
+        arguments = self._emitters[robot].address, addressof(self.receivers), first - self.delay, last - self.delay
+        return bool(light_code()["is_dark"](*arguments))

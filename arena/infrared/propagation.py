@@ -22,7 +22,7 @@ from arena.scene.loader import Scene
 from arena.scene.robot_kind import EPUCK
 from arena.world.poses import Poses
 from emu.boards.epuck.analog import PULSE_PINS, SENSORS
-from emu.native_library import ADDRESS, INT, functions
+from emu.native_library import ADDRESS, INT, address_of, functions
 
 PUBLISHED: Final = (
     (7.5, 3534.0), (8.0, 2104.0), (8.5, 1135.0), (9.0, 702.0), (9.5, 509.0), (10.0, 376.0), (10.5, 305.0),
@@ -183,7 +183,14 @@ class Optics:
             for kind in kinds
         ))  # fmt: skip
 
-    def _set_poses(self, poses: Poses) -> None:
+    def native_handle(self) -> tuple[int, int, int, int]:
+        """Return the host addresses of `signal`, `surfaces`, and their first two arguments (propagation.c).
+
+        `set_poses` fills the second one.
+        """
+        return address_of(self._signal), address_of(self._surfaces), self._at, self._poses_at
+
+    def set_poses(self, poses: Poses) -> None:
         """Pass the poses to native code. Raises ValueError if their objects are not the first ones of the scene."""
         robots, objects, polygons = poses.counts
         if robots > len(self._robots):
@@ -197,7 +204,7 @@ class Optics:
 
     def signals(self, poses: Poses, robot: int, others: Iterable[int]) -> list[Signal]:
         """Return the light of `others` at a robot, without those it receives nothing of."""
-        self._set_poses(poses)
+        self.set_poses(poses)
         found: list[Signal] = []
         for other in others:
             if self._signal(self._at, self._poses_at, robot, other, self._found_at):
@@ -207,7 +214,7 @@ class Optics:
 
     def surfaces(self, poses: Poses, robot: int) -> list[Surface]:
         """Return the surface that the axis of each sensor hits: wall, obstacle, object or robot."""
-        self._set_poses(poses)
+        self.set_poses(poses)
         self._surfaces(self._at, self._poses_at, robot, self._found_at)
         found = iter(self._found)
         return [Surface(10 * centimetres, share) for centimetres, share in zip(found, found, strict=True)]

@@ -1,7 +1,7 @@
 """The ring of infrared sensors in the world: own reflections, room light, lamps and other robots' light (epuck.md §5).
 
-Nothing is computed before the firmware converts one of the eight channels, and then once per quantum. Light of other
-robots arrives one quantum late, so the order in which the robots run has no effect.
+Nothing is computed before the firmware converts one of the eight channels, and then once per quantum, by light.c. Light
+of other robots arrives one quantum late, so the order in which the robots run has no effect.
 """
 
 from __future__ import annotations
@@ -12,13 +12,13 @@ from ctypes import Structure, addressof, c_double, c_int64, c_uint64, c_void_p
 from functools import partial
 from typing import Final
 
-from arena.infrared.channel import OpticalChannel, Receivers, light_code
+from arena.infrared.channel import Emission, OpticalChannel, Receivers, light_code
 from arena.infrared.propagation import Optics
 from arena.scene import dimensions
 from arena.scene.loader import FCY, Scene
 from arena.world.physics import STREAM_INFRARED, generator
 from arena.world.poses import Poses
-from emu.boards.epuck.analog import PULSE_PINS, SENSORS, reflection_at
+from emu.boards.epuck.analog import PULSE_PINS, SENSORS
 from emu.boards.epuck.board import Epuck
 from emu.native_library import address_of
 
@@ -57,6 +57,19 @@ class _Light(Structure):
     ]  # fmt: skip
 
 
+class _Sensing(Structure):
+    """`struct sensing` of light.c, which explains the fields."""
+
+    _fields_ = [
+        *((name, c_void_p) for name in ("signal", "surfaces", "start_segment", "reflect", "record", "ring", "adc_state",
+                                        "adc_mark", "adc_frozen", "optics", "poses", "light", "histories")),
+        ("banks", c_void_p * 2),
+        *((name, c_int64) for name in ("robot", "quantum", "is_stale", "has_lamps", "begin")),
+    ]  # fmt: skip
+    begin: int
+    is_stale: int
+
+
 class InfraredRing:
     """The eight sensors of one robot, between its board and the world. The board is powered on at cycle `on_at`.
 
@@ -72,41 +85,51 @@ class InfraredRing:
         self._robot = robot
         self._on_at = on_at
         self._poses = Poses([], [])
-        self._is_stale = True
-        self._begin = 0
         self.is_read = False
         """Whether the firmware has ever converted one of the sensors."""
         self.poses_source: Callable[[], Poses] | None = None
         """Source of the poses at the first conversion; later ones come by `begin_quantum`."""
         self._optics: Optics | None = None
         rng = generator(seed, STREAM_INFRARED, robot)
-        setting = scene.infrared
+        setting, code = scene.infrared, light_code()
         self._light = _Light(
             channel.receivers, on_at, channel.delay, 0, _SourceList(), _SourceList(), setting.lost_share,
             setting.ripple_counts, _RIPPLE, setting.noise_counts, *LOST_TCY, int(rng.integers(1 << 62)),
         )  # fmt: skip
         self._banks = [(_Source * (channel.robots or 1))() for _ in range(2)]
+        self._histories = channel.emitter_addresses()
+        has_lamps = bool(scene.lamps or scene.light.lamp_counts)
+        self._sensing = _Sensing(
+            light=addressof(self._light), histories=addressof(self._histories), robot=robot, quantum=channel.quantum,
+            banks=(c_void_p * 2)(*map(addressof, self._banks)), is_stale=True, has_lamps=has_lamps,
+        )  # fmt: skip
+        self.sensing: Final = addressof(self._sensing)
+        """Host address of `struct sensing` of light.c."""
+        self.begin_natively: Final = address_of(code["begin_quantum"])
+        """Host address of the function `begin_quantum` of light.c. It may be called once a sensor has been read."""
         self._offsets = rng.normal(0.0, scene.light.ambient_sd_counts, SENSORS).tolist()
-        self._is_lit_alike = not (scene.lamps or scene.light.lamp_counts)
         board.ir.tau_seconds = setting.tau_us * 1e-6
-        board.ir.set_external_light(self._on_conversion, address_of(light_code()["light"]), addressof(self._light))
-        for line, pin in enumerate(PULSE_PINS):
-            board.chip.pins.watch(pin, partial(self._on_pulse_line, line))
+        board.ir.set_external_light(self._on_conversion, address_of(code["light"]), addressof(self._light))
+        watchers = [partial(self._on_pulse_line, line) for line in range(len(PULSE_PINS))]
+        for pin, watcher in zip(PULSE_PINS, watchers, strict=True):
+            board.chip.pins.watch(pin, watcher)
+        self._emission = Emission(channel.emitter(robot).address, addressof(channel.receivers), on_at)
+        board.ir.emit_natively(watchers, address_of(code["emit"]), addressof(self._emission))
 
     def begin_quantum(self, poses: Poses) -> None:
         """Begin a quantum with `poses`. Conversions that sampled before it use the values before it."""
         self._poses, begin = poses, self._adc.now + 1
         if not self.is_read:
             return
-        since = self._adc.samples_from
-        if since is not None and since < self._begin:
+        since, sensing = self._adc.samples_from, self._sensing
+        if since is not None and since < sensing.begin:
             self._adc.catch_up(begin - 1)
             since = self._adc.samples_from
-        self._begin = begin
+        sensing.begin = begin
         if since is not None:  # a conversion is under way
             self._sense(begin)
-        elif not self._is_stale:
-            self._is_stale = True
+        elif not sensing.is_stale:
+            sensing.is_stale = True
             self._board.ir.set_native_ready(False)
 
     @property
@@ -121,7 +144,7 @@ class InfraredRing:
 
     def _on_conversion(self, cycle: int) -> None:
         """Update the sensors for a conversion that samples at a cycle, if none has in this quantum."""
-        if self._is_stale:
+        if self._sensing.is_stale:
             if self.poses_source is not None and not self.is_read:
                 self._poses = self.poses_source()
             self._sense(cycle)
@@ -131,32 +154,27 @@ class InfraredRing:
         ir = self._board.ir
         if self._optics is None:
             self._optics = Optics(self._scene)
+            self._connect(self._optics)
         ir.start_segment(begin)
-        if not self._is_lit_alike or not self.is_read:
+        if self._sensing.has_lamps or not self.is_read:
             counts = ambient(self._scene, self._poses.robots[self._robot])
             for sensor, (one, offset) in enumerate(zip(counts, self._offsets, strict=True)):
                 ir.ambient[sensor] = min(max(round(one + offset), 0), 4095)
-        for sensor, (distance, share) in enumerate(self._optics.surfaces(self._poses, self._robot)):
-            ir.reflection[sensor] = round(reflection_at(distance) * share)
-        self._find_sources(begin)
-        self._is_stale, self.is_read = False, True
+        if self._poses.counts[0] > self._channel.robots:
+            raise ValueError(f"{self._poses.counts[0]} robots are more than the channel has")
+        self._optics.set_poses(self._poses)
+        light_code()["sense"](self.sensing, begin)
+        self.is_read = True
         ir.set_native_ready(True)
 
-    def _find_sources(self, begin: int) -> None:
-        """Set the robots whose light can arrive in this quantum."""
-        channel, light = self._channel, self._light
-        now, robots = self._on_at + begin, range(self._poses.counts[0])
-        lit = [other for other in robots
-               if other != self._robot and not channel.is_dark(other, now, now + channel.quantum)]  # fmt: skip
-        self._banks.reverse()
-        bank, count = self._banks[0], 0
-        if lit:
-            assert self._optics is not None
-            for other, counts, shares in self._optics.signals(self._poses, self._robot, lit):
-                bank[count] = _Source(counts, shares, other, channel.emitter(other).address)
-                count += 1
-        light.begin, light.past.count, light.past.sources = begin, light.now.count, light.now.sources
-        light.now.count, light.now.sources = count, addressof(bank)
+    def _connect(self, optics: Optics) -> None:
+        """Set the native functions, and the host addresses that they use."""
+        sensing, record = self._sensing, self._board.ir.record
+        sensing.signal, sensing.surfaces, sensing.optics, sensing.poses = optics.native_handle()
+        sensing.start_segment, sensing.reflect, sensing.record, sensing.ring = self._board.ir.native_handle()
+        sensing.adc_state, sensing.adc_mark, sensing.adc_frozen = (
+            record.address + record.fields[f"adc.{name}"].offset for name in ("state", "mark", "frozen")
+        )
 
 
 def _axes(heading: float) -> list[tuple[float, float]]:

@@ -1,8 +1,9 @@
 // Demand lock-step in native code: robots run ahead until they observe the world, and the world follows the slowest.
 //
-// This is the loop of scheduler.py. A robot's native code runs until a camera line is read, a quantum ends or the CPU
-// is probed; this file handles these three. For every other exit reason Python continues with the robot. Between two
-// steps of the world, robots share no state, so several threads can run them.
+// This is the loop of scheduler.py. A robot's native code runs until a camera line is read, a quantum ends, the CPU is
+// probed or infrared sensors need the poses of the next quantum; this file handles these four. For every other exit
+// reason Python continues with the robot. Between two steps of the world, robots share only the histories of their
+// emitters (light.c), of which others read no part that is still written. So several threads can run them.
 
 #include <stdint.h>
 
@@ -11,8 +12,9 @@ typedef uint64_t u64;
 typedef double f64;
 
 // States of a robot, in this order: Python runs it, or it has reached the goal; it can run; it waits for the poses of a
-// camera line; Python waits for its poses; its native code has returned with an exit reason for Python.
-enum { IN_PYTHON, RUNNABLE, AWAITS_LINE, AWAITS_POSES, RETURNED };
+// camera line; Python waits for its poses; its native code has returned with an exit reason for Python; its infrared
+// sensors wait for the poses of a quantum.
+enum { IN_PYTHON, RUNNABLE, AWAITS_LINE, AWAITS_POSES, RETURNED, AWAITS_QUANTUM };
 
 // Results of `run_all` other than a robot's number.
 enum { REACHED = -1, NEEDS_WORLD = -2 };
@@ -30,7 +32,7 @@ struct native {
     i64 room, interpret, service, awake, trap;
 };
 
-// Functions of other source files (line.c, motors.c, renderer.c, wheels.c, numpy's generator).
+// Functions of other source files (line.c, motors.c, renderer.c, wheels.c, numpy's generator, light.c).
 struct code {
     i64 (*row_due)(const void *camera, i64 setting, i64 cycle, i64 *href);
     void (*send_line)(const void *camera, i64 href, const uint8_t *pixels);
@@ -39,6 +41,7 @@ struct code {
     i64 (*steps_by)(const void *pair, i64 now, const u64 *cycles, i64 count, i64 *steps);
     void (*add_steps)(void *drive, i64 first, i64 count, const i64 *steps);
     uint32_t (*draw)(void *generator);
+    i64 (*begin_quantum)(void *sensing, const f64 *poses, i64 begin);
 };
 
 // A robot. Ticks count quanta since the start of the trial. Cycles count from power-on, at cycle `on_at` of the trial.
@@ -65,6 +68,8 @@ struct robot {
     void *drive, *generator;
     i64 *steps;    // [most quanta of one run][2]: motor steps of the left and the right wheel in each quantum
     i64 row, href; // of the picture and of the camera line that is to be rendered
+    void *sensing;
+    i64 senses, sensed_tick; // whether infrared sensors have been read; quantum that has begun for them
 };
 
 // The world (physics.py).
@@ -131,14 +136,25 @@ static int report_steps(struct robot *r)
     return 1;
 }
 
-// Probe whether the CPU is awake, at the limit set for it. Return 0 if Python must continue: the limit is another one,
-// or the firmware may be stuck.
-static int probe_cpu(struct robot *r)
+// Set the cycle at which native code returns to this file: the next CPU probe, the end of the run, or the end of the
+// quantum if infrared sensors are read.
+static void set_limit(const struct robot *r, i64 tick)
+{
+    const struct native *n = r->native;
+    i64 last = r->probe_at < r->end ? r->probe_at : r->end, cut = quantum_end(r, tick);
+    *n->last = (u64)(r->senses && cut < last ? cut : last);
+    *n->limit = (u64)(cut < last ? cut : last);
+    *n->begins = 1;
+}
+
+// At the limit: probe whether the CPU is awake, and wait for the poses of the next quantum, if these are due. Return 0
+// if Python must continue: the limit is another one, or the firmware may be stuck.
+static int pass_limit(struct robot *r)
 {
     struct native *n = r->native;
     i64 now = (i64)*n->cycle, tick = r->quanta_taken + (i64)*n->noted;
-    int awake = *n->mode == n->awake;
-    if (!*n->last || now < (i64)*n->last || now < r->probe_at || now >= r->end)
+    int awake = *n->mode == n->awake, is_probed = now >= r->probe_at, is_cut = r->senses && now >= quantum_end(r, tick);
+    if (!*n->last || now < (i64)*n->last || !(is_probed || is_cut) || now >= r->end)
         return 0;
     if (*n->corcon & n->trap || !(awake || *n->enables[0] || *n->enables[1] || *n->enables[2]))
         return 0;
@@ -147,15 +163,34 @@ static int probe_cpu(struct robot *r)
             return 0;
         n->notes[(*n->noted)++] = (u64)now;
     }
-    if (tick - r->quanta_reported >= r->report_after && !report_steps(r))
+    if ((is_cut || tick - r->quanta_reported >= r->report_after) && !report_steps(r))
         return 0;
-    r->probes++, r->busy_probes += awake, r->stuck_since = -1;
-    r->probe_at = now + 1 + random_below(r, (u64)r->probe_span);
-    i64 last = r->probe_at < r->end ? r->probe_at : r->end, cut = quantum_end(r, tick);
-    *n->last = (u64)last;
-    *n->limit = (u64)(cut < last ? cut : last);
-    *n->begins = 1;
+    if (is_probed) {
+        r->probes++, r->busy_probes += awake, r->stuck_since = -1;
+        r->probe_at = now + 1 + random_below(r, (u64)r->probe_span);
+    }
+    if (is_cut)
+        r->tick = tick, r->state = AWAITS_QUANTUM;
+    else
+        set_limit(r, tick);
     return 1;
+}
+
+// Begin the quantum whose poses the robot has awaited, unless Python must do so.
+static void begin_quantum(struct robot *r, const struct native_world *g)
+{
+    const struct native *n = r->native;
+    i64 begin = (i64)*n->cycle + 1;
+    *n->begins = 1;
+    r->state = RETURNED;
+    if (r->tick < g->ticks || *n->deadline < (u64)begin)
+        return;
+    *n->now = *n->cycle;
+    if (!r->code->begin_quantum(r->sensing, g->now, begin))
+        return;
+    r->sensed_tick = r->tick;
+    r->state = RUNNABLE;
+    set_limit(r, r->tick);
 }
 
 // Whether the next instruction reads a camera line that this file can render. If so, the robot waits for its poses.
@@ -201,9 +236,11 @@ static void run_robot(struct robot *r, const struct native_world *g)
     const struct native *n = r->native;
     if (r->state == AWAITS_LINE)
         render_line(r, g);
+    if (r->state == AWAITS_QUANTUM)
+        begin_quantum(r, g);
     while (r->state == RUNNABLE) {
         r->exit_reason = n->entry(n->record, n->env);
-        if (r->exit_reason == n->interpret ? wait_for_line(r, g) : r->exit_reason == n->service && probe_cpu(r))
+        if (r->exit_reason == n->interpret ? wait_for_line(r, g) : r->exit_reason == n->service && pass_limit(r))
             continue;
         *n->begins = 1;
         r->state = RETURNED;
@@ -270,7 +307,8 @@ static void run_ready(struct scheduler *s)
     i64 count = 0;
     for (i64 i = 0; i < s->count; i++) {
         struct robot *r = s->robots[i];
-        if (r->state == RUNNABLE || (r->state == AWAITS_LINE && r->tick <= s->native_world->ticks))
+        int awaits = r->state == AWAITS_LINE || r->state == AWAITS_QUANTUM;
+        if (r->state == RUNNABLE || (awaits && r->tick <= s->native_world->ticks))
             s->ready[count++] = r;
     }
     if (!s->worker_count || count < 2) {

@@ -1,7 +1,8 @@
 """`NativeScheduler`: run all robots of a world in native code (lockstep.c), by one or several threads.
 
 Input: the robots (`NativeRobot`), the addresses of their speeds and of the world. Output: which robot needs Python.
-Between two steps of the world, robots share no state. So the record does not depend on which thread runs a robot.
+Between two steps of the world, robots share no state that changes, except that they append to the histories of their
+emitters. So the record does not depend on which thread runs a robot.
 """
 
 from __future__ import annotations

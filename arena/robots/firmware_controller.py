@@ -132,10 +132,11 @@ class FirmwareController:
         self.native: Final = NativeRobot(
             quantum=self._quantum, on_at=self._on_at, probe_at=1, stuck_since=-1, probe_span=2 * PROBE_TCY,
             report_after=REPORT_AFTER, strip_first=_STRIP_ROWS.start, strip_last=_STRIP_ROWS.stop - 1,
-            last_strip_row=-1, colours=self._colours_at, noise=self._noise_at, noise_shift=_DRAWN_BITS - _NOISE_BITS,
+            last_strip_row=-1, sensed_tick=-1, colours=self._colours_at, noise=self._noise_at,
+            noise_shift=_DRAWN_BITS - _NOISE_BITS,
         )  # fmt: skip
         """The robot as native code sees it. Python and native code share its sequence of CPU probes."""
-        self.native.connect(self._board, self._renderer, self.wheels, self._draw, self._drawn_from)
+        self.native.connect(self._board, self._renderer, self.wheels, self._ring, self._draw, self._drawn_from)
         self._native_runner: NativeRunner | None = None
         self.is_native = True
         """Whether the scheduler runs native code. False while a robot of the trial is debugged: its breakpoints are in
@@ -227,11 +228,11 @@ class FirmwareController:
             if self.ticks_done >= self._off_tick or self._fault or self._end_of(self.ticks_done) <= 0:
                 self.wheels.set_stopped(self.ticks_done)
                 self.ticks_done += 1
-            elif self._poses_at is not None and self._ring.is_read:
-                self._report_steps()
-                self._begin_quantum(self.ticks_done, *self._poses_at(self.ticks_done))
-                self._run(self.ticks_done + 1)
             else:
+                if self._poses_at is not None and self._ring.is_read and self.native.sensed_tick != self.ticks_done:
+                    self._report_steps()
+                    self._begin_quantum(self.ticks_done, *self._poses_at(self.ticks_done))
+                    self.native.senses, self.native.sensed_tick = True, self.ticks_done
                 self._run(min(ticks, self._off_tick))
         self._report_steps()
 
@@ -249,14 +250,14 @@ class FirmwareController:
         return (tick + 1) * self._quantum - self._on_at
 
     def _run(self, ticks: int) -> None:
-        """Run until `ticks` quanta are finished or the next CPU probe is due."""
+        """Run until `ticks` quanta are finished, the next CPU probe is due, or infrared sensors need new poses."""
         machine, native = self.machine, self.native
         ends = len(self._quantum_ends)
         if native.quanta_reported >= self._first_quantum + ends or ends >= REPORT_AFTER:
             self._report_steps()
             self._quantum_ends, self._first_quantum, native.quanta_reported = [], self.ticks_done, self.ticks_done
         native.end = self._end_of(ticks - 1)
-        last = min(native.probe_at, native.end)
+        last = min(native.probe_at, self._end_of(self.ticks_done) if native.senses else native.end)
         stop = self.control.run_past(self._end_of(self.ticks_done), self._quantum, last, self._quantum_ends)
         self.ticks_done = self._first_quantum + len(self._quantum_ends)
         if stop is not None:

@@ -9,6 +9,7 @@ from collections.abc import Callable
 from ctypes import POINTER, Structure, addressof, c_int64, c_void_p, pointer
 
 from arena.camera.renderer import Renderer, RowRays
+from arena.infrared.ring import InfraredRing
 from arena.world.wheels import Wheels
 from emu.boards.epuck.board import Epuck
 from emu.boards.epuck.camera.camera import DATA_PORT
@@ -25,7 +26,8 @@ IN_PYTHON, RUNNABLE, AWAITS_LINE, AWAITS_POSES = range(4)
 class _Code(Structure):
     """`struct code` of lockstep.c."""
 
-    _fields_ = [(name, c_void_p) for name in ("row_due", "send_line", "render_line", "steps_by", "add_steps", "draw")]
+    _fields_ = [(name, c_void_p) for name in ("row_due", "send_line", "render_line", "steps_by", "add_steps", "draw",
+                                              "begin_quantum")]
 
 
 class NativeRobot(Structure):
@@ -39,7 +41,8 @@ class NativeRobot(Structure):
         *((name, c_int64) for name in ("camera_setting", "strip_first", "strip_last", "last_strip_row")),
         ("colours", c_void_p), ("noise", c_void_p), ("noise_shift", c_int64),
         *((name, c_void_p) for name in ("pair", "drive", "generator", "steps")),
-        *((name, c_int64) for name in ("row", "href")),
+        *((name, c_int64) for name in ("row", "href")), ("sensing", c_void_p),
+        *((name, c_int64) for name in ("senses", "sensed_tick")),
     ]  # fmt: skip
     state: int
     tick: int
@@ -54,10 +57,13 @@ class NativeRobot(Structure):
     camera_setting: int
     last_strip_row: int
     pair: int
+    senses: int
+    sensed_tick: int
 
     def connect(
-        self, board: Epuck, renderer: Renderer, wheels: Wheels, draw: Callable[..., int], generator: int
-    ) -> None:
+        self, board: Epuck, renderer: Renderer, wheels: Wheels, ring: InfraredRing, draw: Callable[..., int],
+        generator: int,
+    ) -> None:  # fmt: skip
         """Set the native functions and objects of the robot's parts. `draw(generator)` returns 32 random bits."""
         assert board.camera is not None
         lines = line_code()
@@ -68,7 +74,9 @@ class NativeRobot(Structure):
         self.camera = addressof(self._camera)
         self.data_port = board.chip.ports[DATA_PORT].port.address >> 1
         row_due, send_line = map(address_of, (lines["row_on_bus"], lines["write_line"]))
-        self.code = pointer(_Code(row_due, send_line, render_line, board.motors.code, add_steps, address_of(draw)))
+        self.sensing = ring.sensing
+        functions = row_due, send_line, render_line, board.motors.code, add_steps, address_of(draw), ring.begin_natively
+        self.code = pointer(_Code(*functions))
         self._rays_by_row: dict[int, RowRays] = {}
         self._ray_addresses = (c_void_p * HEIGHT)()
         self.row_rays = addressof(self._ray_addresses)

@@ -12,12 +12,15 @@ is not written edge by edge but attached as a `Waveform`, a function of the cycl
 
 Eager watchers (interrupts, clocks, gates) are called at the edge. Lazy watchers (motors, LEDs) are called in order, but
 later. If only lazy pins change, native code may write a latch itself: it appends the new levels to `ring`, and `flush`
-calls the watchers. Call `flush` before reading a result that a lazy watcher computes.
+calls the watchers. Call `flush` before reading a result that a lazy watcher computes. Host code can replace the eager
+watchers of a pin for native code (`handle_natively`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Container, Iterable
+from functools import reduce
+from operator import or_
 from typing import Any, Final, Protocol
 
 from emu.system.events import Events
@@ -127,6 +130,11 @@ class Pins:
         bit 0 on, number of levels, cycles per level.
         """
         self._eager_before_log: list[int] = []
+        self._native_cells: Final = record.reserve_addresses(3 * len(PORTS))
+        first = self._native_cells >> 3
+        self._native: Final = record.u64[first : first + 3 * len(PORTS)]
+        self._handlers: Final[dict[int, tuple[int, Container[Watcher]]]] = {}
+        """For each port with native edge handling: its pins, and the watchers that host code replaces."""
         self._watchers: Final[list[list[tuple[int, Watcher]]]] = [[] for _ in PORTS]
         self._lazy_watchers: Final[list[list[tuple[int, Watcher]]]] = [[] for _ in PORTS]
         self._ring_watchers: Final[list[list[tuple[int, Watcher]]]] = [[] for _ in PORTS]
@@ -162,6 +170,8 @@ class Pins:
                 self.eager[port] = mask
         self._edges = log
         self._u64[self._logged] = log is not None
+        for port in self._handlers:
+            self.resume_native(port)
 
     def watch(self, name: str, watcher: Watcher, *, lazy: bool = False) -> None:
         """Call `watcher` for every edge on one pin. With `lazy`, the call may happen later."""
@@ -193,6 +203,30 @@ class Pins:
                 self._ports_with_ring_watchers |= 1 << port
         table = self.lazy if lazy else self.eager
         table[port] |= 0 if inputs_only else mask
+        if port in self._handlers:
+            self.resume_native(port)
+
+    def native_cell(self, port: int) -> Cell:
+        """Return the rule operand with the pins whose edges host code handles; its address and data pointer follow."""
+        return Cell(self._native_cells + 24 * port, 64)
+
+    def handle_natively(self, port: int, mask: int, replaced: Container[Watcher], code: int, data: int) -> None:
+        """Let native code call host code for edges on the pins in `mask` instead of their watchers `replaced`.
+
+        int64 code(record, data, port, changed, levels, cycle): as a watcher. A pin with any other watcher stays with
+        Python. No waveform of the port may depend on the pins. Host code may clear pins of `native_cell`;
+        `resume_native` sets them again.
+        """
+        self._handlers[port] = mask, replaced
+        self._native[3 * port + 1], self._native[3 * port + 2] = code, data
+        self.resume_native(port)
+
+    def resume_native(self, port: int) -> None:
+        """Leave the edges of a port to host code again, as far as `handle_natively` allows it."""
+        mask, replaced = self._handlers[port]
+        watched = (pins for pins, watcher in self._watchers[port] if watcher not in replaced)
+        others = reduce(or_, watched, 0xFFFF if self._edges is not None else 0)
+        self._native[3 * port] = mask & ~others
 
     def watched_ports(self, readers: int) -> int:
         """Return a mask of the ports whose ring entries have consumers other than `readers` ring readers."""

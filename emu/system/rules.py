@@ -112,6 +112,12 @@ class RuleBuilder(Protocol):
     def call(self, code: Number, data: Number, *numbers: Number) -> Number:
         """Call host code: int64 code(record, data, numbers...). It must not change anything that a rule reads."""
 
+    def notify(self, condition: Number, code: Number, data: Number, *numbers: Number) -> None:
+        """Call host code as `call` does, but after all stores of the rule, and only if `condition` holds.
+
+        If it may hold, the rule requires `can_call(code)`.
+        """
+
     def lazy_select(
         self, condition: Number, costly: Callable[[], tuple[Number, ...]], *others: Number
     ) -> tuple[Number, ...]:
@@ -180,6 +186,9 @@ class IntegerOperations:
 
     def call(self, _code: int, _data: int, *_numbers: int) -> int:
         raise RuleNotApplicable
+
+    def notify(self, condition: Number, _code: int, _data: int, *_numbers: int) -> None:
+        assert not condition, "a rule that may notify requires can_call"
 
     def lazy_select(self, condition: Number, costly: Callable[[], tuple[int, ...]], *others: int) -> tuple[int, ...]:
         return costly() if condition else others

@@ -139,6 +139,26 @@ def _senses(chance: Chance, _n: int) -> str:
         bclr    LATG, #0"""
 
 
+def _scans(chance: Chance, _n: int) -> str:
+    """Scan some infrared sensors without pause, and toggle pulse lines, also two at once and by a pointer."""
+    settings = {
+        "ADCON1": 0, "ADCSSL": chance.randrange(1, 256) << 8, "ADCON2": 0x400 | chance.randrange(16) << 2,
+        "ADCON3": chance.randrange(1, 32) << 8 | chance.randrange(64), "ADCON1 ": 0x80E4,
+    }  # fmt: skip
+    setup = "".join(f"\n        mov     #{value:#x}, w0\n        mov     w0, {to}" for to, value in settings.items())
+    both = "mov     #{:#x}, w0\n        {}"
+    ways = (
+        "btg     LATF, #7", "btg     LATF, #8", "btg     LATG, #0", "btg     LATG, #1",
+        both.format(0x180, "xor     LATF"), both.format(3, "mov     #LATG, w8\n        xor     w0, [w8], [w8]"),
+    )  # fmt: skip
+    toggles = "".join(
+        f"\n        {way}\n        repeat  #{chance.randrange(1 << chance.randrange(1, 14))}\n        nop"
+        for way in chance.choices(ways, k=chance.randrange(1, 9))
+    )
+    read = "\n        mov     ADCBUF0, w0\n        xor     w0, w2, w2"
+    return (setup if chance.random() < 0.5 else "") + toggles + read * chance.randrange(2)
+
+
 def _sets_camera(chance: Chance, _n: int) -> str:
     """Set a register of the camera by I2C; in 30 % of the cases one that only changes the brightness."""
     if chance.random() < 0.3:
@@ -223,8 +243,8 @@ def _ends(chance: Chance, _n: int) -> str:
 
 
 PIECES: Final = ((_looks, 8), (_awaits_line, 1), (_waits, 3), (_idles, 2), (_sleeps, 0.3), (_turns, 4), (_blinks, 2),
-                 (_talks, 2), (_hears, 2), (_senses, 1), (_sets_camera, 0.5), (_guards, 2), (_traps, 0.6), (_asks, 1),
-                 (_ends, 0.7))  # fmt: skip
+                 (_talks, 2), (_hears, 2), (_senses, 1), (_scans, 3), (_sets_camera, 0.5), (_guards, 2), (_traps, 0.6),
+                 (_asks, 1), (_ends, 0.7))  # fmt: skip
 
 
 FAST: Final = {"PO3030K": ((0x4E, 0x0C), (0x1D, 0x00), (0x20, 0x33))}

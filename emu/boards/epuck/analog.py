@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import struct
 from bisect import bisect_left
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from ctypes import Structure, addressof, c_double, c_int64, c_uint16, c_void_p
 from functools import cache, partial
 from itertools import pairwise
@@ -16,6 +16,7 @@ from emu.boards.noise import Noise
 from emu.boards.part import BoardPart
 from emu.native_library import ADDRESS, DOUBLE, INT, address_of, functions
 from emu.peripherals import Peripherals
+from emu.peripherals.pins import Watcher, parse_pin
 
 SENSORS: Final = 8
 _FIRST_CHANNEL: Final = 8
@@ -27,6 +28,8 @@ _SETTLED: Final = 9.2
 """Settling time, in time constants: the largest reflection is then within half a count of its final value."""
 _DECAYED: Final = 45.0
 """Time constants after which a switch of the emitter no longer affects a level: 4095 e^-45 is 1e-16."""
+_EDGES: Final = 128
+"""Twin of EDGES in ring.c."""
 _FASTEST_HZ: Final = 30e6
 """Frequency in Hz of the fastest instruction clock (chip §3)."""
 AMBIENT: Final = 3800  # UNVERIFIED: 3500 to 4000 indoors (epuck.md §5)
@@ -59,10 +62,13 @@ class _Ring(Structure):
     """Mirror of `struct ring` in ring.c."""
 
     _fields_ = [
-        *((name, c_int64) for name in ("ambient", "reflection", "lit", "since", "from", "tau", "seed", "strength")),
+        *((name, c_int64) for name in ("ambient", "reflection", "lit", "since", "from", "tau", "seed", "strength",
+                                       "edges", "edge_count")),
+        *((name, c_int64 * len(PULSE_PINS)) for name in ("native", "port", "pin")),
         *((name, c_double) for name in ("decayed", "noise_counts", "noise_share")), ("begin", c_int64),
         ("past_ambient", c_uint16 * SENSORS), ("past_reflection", c_uint16 * SENSORS),
-        ("outside", c_void_p), ("light", c_void_p),
+        *((name, c_void_p) for name in ("outside", "light", "emit", "emission")),
+        *((name, c_double * len(RESPONSE)) for name in ("near", "counts", "slope")),
     ]  # fmt: skip
 
 
@@ -71,6 +77,10 @@ def _code() -> dict[str, Callable[..., int]]:
     return functions(Path(__file__).with_name("ring.c"), {
         "level": (INT, (ADDRESS, ADDRESS, INT, INT)),
         "settled": (DOUBLE, (ADDRESS, ADDRESS, INT, INT)),
+        "apply_edges": (None, (ADDRESS, ADDRESS, INT)),
+        "start_segment": (None, (ADDRESS, ADDRESS, INT)),
+        "reflect": (None, (ADDRESS, ADDRESS, INT, DOUBLE, DOUBLE)),
+        "edge": (INT, (ADDRESS, ADDRESS, INT, INT, INT, INT)),
     })  # fmt: skip
 
 
@@ -93,10 +103,20 @@ class Infrared(BoardPart):
         """Settled share of each line at its last switch, in 1/65535."""
         self._tau: Final = self.cell("tau", "Q")
         """`tau_seconds` in Tcy, stored as the bits of a double."""
+        self.array("edges", "Q", _EDGES)
+        self._edge_count: Final = self.cell("edge_count", "Q")
+        """Number of edges from native code that no conversion has seen yet."""
         own = ("ir.ambient", "ir.reflection", "ir.lit", "ir.since", "ir.from", "ir.tau")
-        places = [self.record.fields[name].offset for name in (*own, "noise.seed", "noise.strength")]
+        names = (*own, "noise.seed", "noise.strength", "ir.edges", "ir.edge_count")
+        places = [self.record.fields[name].offset for name in names]
+        self._lines: Final = [parse_pin(pin) for pin in PULSE_PINS]
+        """Port and mask of each pulse line."""
+        native = [self.pins.native_cell(port).offset for port, _ in self._lines]
+        lines = [(c_int64 * len(PULSE_PINS))(*row) for row in (native, *zip(*self._lines, strict=True))]
         decayed = _DECAYED * self._tau_seconds * _FASTEST_HZ
-        self._ring: Final = _Ring(*places, decayed, NOISE_COUNTS, NOISE_SHARE)
+        self._ring: Final = _Ring(*places, *lines, decayed, NOISE_COUNTS, NOISE_SHARE)
+        self._ring.near[:], self._ring.counts[:] = zip(*RESPONSE, strict=True)
+        self._ring.slope[: len(_SLOPE)] = _SLOPE
         self._ring_at: Final = addressof(self._ring)
         self._update_tau()
         chip.oscillator.on_change.append(self._update_tau)
@@ -104,8 +124,9 @@ class Infrared(BoardPart):
         for sensor in range(SENSORS):
             self.ambient[sensor] = AMBIENT
             chip.adc.source[_FIRST_CHANNEL + sensor] = self._sources[sensor]
+        self._watchers: Final = [partial(self._switched, line) for line in range(len(PULSE_PINS))]
         for line, pin in enumerate(PULSE_PINS):
-            self.pins.watch(pin, partial(self._switched, line))
+            self.pins.watch(pin, self._watchers[line])
             self._predict(line)
         noise.on_change.append(self._predict_all)
 
@@ -121,18 +142,32 @@ class Infrared(BoardPart):
         self._update_tau()
 
     def _update_tau(self) -> None:
+        self._apply_edges()
         (self._tau.value,) = struct.unpack("<Q", struct.pack("<d", self._tau_seconds * self.chip.fcy))
 
     def set_external_light(self, prepare: Callable[[int], None], light: int, data: int) -> None:
         """Subtract external light from the sensors' levels.
 
         The native function double light(data, sensor, cycle) returns the counts to subtract. Before each conversion,
-        `prepare(cycle)` is called and may set `ambient` and `reflection`, unless
+        `prepare(cycle)` is called and may set `ambient` and `reflection`, unless native code may compute the levels
+        (`set_native_ready`).
         """
         self._prepare = prepare
         self._ring.outside, self._ring.light = light, data
         self.set_native_ready(False)
         self._predict_all()
+
+    def emit_natively(self, watchers: Sequence[Watcher], emit: int, emission: int) -> None:
+        """Let native code handle edges of the pulse lines without Python. Needs external light.
+
+        The native function int64 emit(emission, line, lit, cycle) replaces `watchers` of the pulse lines. It returns
+        0 if Python must handle the next edge.
+        """
+        self._ring.emit, self._ring.emission = emit, emission
+        replaced: list[Watcher] = [*self._watchers, *watchers]
+        for port in {port for port, _ in self._lines}:
+            mask = sum(pin for other, pin in self._lines if other == port)
+            self.pins.handle_natively(port, mask, replaced, address_of(_code()["edge"]), self._ring_at)
 
     def set_native_ready(self, is_ready: bool) -> None:
         """Set whether native code may compute levels without calling `prepare`; holds until the next call."""
@@ -150,9 +185,13 @@ class Infrared(BoardPart):
 
         All conversions before the previous segment's start must be complete.
         """
-        ring = self._ring
-        ring.begin = cycle
-        ring.past_ambient[:], ring.past_reflection[:] = self.ambient, self.reflection
+        _code()["start_segment"](self.record.address, self._ring_at, cycle)
+
+    def native_handle(self) -> tuple[int, int, int, int]:
+        """Return the host addresses of `start_segment`, `reflect`, and their first two arguments (ring.c)."""
+        code = _code()
+        functions = address_of(code["start_segment"]), address_of(code["reflect"])
+        return *functions, self.record.address, self._ring_at
 
     def set_distance(self, sensor: int, millimetres: float, share: float = 1.0) -> None:
         """Place a surface in front of a sensor (0..7).
@@ -176,19 +215,30 @@ class Infrared(BoardPart):
 
     def is_lit(self, sensor: int) -> bool:
         """Whether the emitter of a sensor is on, for other robots' sensors."""
+        self._apply_edges()
         return bool(self._lit[sensor % len(PULSE_PINS)])
 
     def lines_lit(self) -> list[bool]:
         """Return, for each pulse line, whether its two emitters are on."""
+        self._apply_edges()
         return [bool(lit) for lit in self._lit]
+
+    def _apply_edges(self) -> None:
+        """Complete the conversions so far, then apply all edges from native code."""
+        if self._edge_count.value:
+            self.chip.adc.catch_up(self.now)
+            _code()["apply_edges"](self.record.address, self._ring_at, self.now + 1)
 
     def _switched(self, line: int, cycle: int, changed: int, levels: int) -> None:
         self.chip.adc.catch_up(self.now)
+        self._apply_edges()
         share = _code()["settled"](self.record.address, self._ring_at, line, cycle)
         self._from[line] = round(share * 0xFFFF)
         self._since[line] = cycle
         self._lit[line] = bool(levels & changed)
         self._predict(line)
+        if self._ring.emit:
+            self.pins.resume_native(self._lines[line][0])
 
     def _predict_all(self) -> None:
         self.chip.adc.catch_up(self.now)
@@ -197,6 +247,7 @@ class Infrared(BoardPart):
 
     def _predict(self, line: int) -> None:
         """Predict the settled levels of a line's receivers, which are constant without noise."""
+        self._apply_edges()
         for sensor in (line, line + len(PULSE_PINS)):
             raw = self.ambient[sensor] - self.reflection[sensor] * bool(self._lit[line])
             level = None if self._noise.strength or self._prepare else min(max(raw, 0), 4095) << 4

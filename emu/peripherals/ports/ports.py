@@ -49,6 +49,7 @@ class Port(Peripheral):
             ring_size=record.fields["pins.ring"].count,
             ring_count=cell_of(record, "pins.ring_count"),
             byte_stream=byte_stream,
+            native=self.context.pins.native_cell(self.index),
             **{name: cell_of(record, f"pins.{name}", self.index) for name in arrays},
         )
         self.lat.set_rule(Rule(operands, None, write_latch))

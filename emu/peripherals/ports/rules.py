@@ -1,4 +1,4 @@
-"""Rules of a port (§6): writes of LAT and PORT that affect no eager watcher, and reads of PORT."""
+"""Rules of a port (§6): writes of LAT and PORT that affect no eager watcher in Python, and reads of PORT."""
 
 from __future__ import annotations
 
@@ -33,6 +33,8 @@ class PortOperands:
     drive: Cell
     analog: Cell
     eager: Cell
+    native: Cell
+    """Cell of the pins whose edges host code handles; the next two hold its address and its data pointer."""
     lazy: Cell
     before: Cell
     waveform_pins: Cell
@@ -70,16 +72,17 @@ def _write(is_port: bool, m: RuleBuilder, p: PortOperands, value: Number, lanes:
     """Write the latch. The new levels apply from the next cycle on; changes of lazy pins are added to the ring."""
     free = p.implemented & lanes
     new = (m.get(p.lat) & (0xFFFF & ~free)) | (value & free)
-    own, drive, level, waveform_pins = m.get(p.owned), m.get(p.drive), m.get(p.level), m.get(p.waveform_pins)
+    own, drive, level = m.get(p.owned), m.get(p.drive), m.get(p.level)
     out = (m.get(p.output) & own) | (new & (own ^ 0xFFFF) & p.implemented)
     shown = (level & (drive ^ 0xFFFF)) | (out & drive & (m.get(p.analog) ^ 0xFFFF))
     changed = level ^ shown
     lazy, used = (changed & m.get(p.lazy)) != 0, m.get(p.ring_count)
-    needs_python = ((changed & m.get(p.eager)) | (waveform_pins & drive)) != 0
-    m.require(((lazy & (used >= p.ring_size)) | needs_python) == 0)
+    native, code, data = changed & m.get(p.native), m.get(p.native, 1), m.get(p.native, 2)
+    needs_python = (changed & m.get(p.eager) & (native ^ 0xFFFF)) != 0
+    m.require((((lazy & (used >= p.ring_size)) | needs_python) == 0) & ((native == 0) | m.can_call(code)))
     following = m.now + 1
     m.put(p.before, m.select(m.get(p.changed) == following, m.get(p.before), level))
-    m.put(p.constant_until, m.select(changed == 0, m.get(p.constant_until), 0))
+    m.put(p.constant_until, m.select(changed == native, m.get(p.constant_until), 0))
     if is_port:
         m.put(p.port, (m.get(p.port) & (0xFFFF & ~free)) | (value & free))
     free_place = m.select(lazy, used, p.ring_size - 1)
@@ -90,11 +93,12 @@ def _write(is_port: bool, m: RuleBuilder, p: PortOperands, value: Number, lanes:
     m.put(p.output, out)
     m.put(p.changed, following)
     m.put(p.level, shown)
+    m.notify(native != 0, code, data, p.number, native, shown, following)
     return True
 
 
 def write_latch(m: RuleBuilder, p: PortOperands, value: Number, lanes: int) -> bool:
-    """Write LAT, if no eager watcher is affected."""
+    """Write LAT, if no eager watcher in Python is affected."""
     return _write(False, m, p, value, lanes)
 
 

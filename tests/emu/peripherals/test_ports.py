@@ -225,3 +225,31 @@ def test_edge_log_sees_every_change_while_it_is_on(rig):
     assert rig.dev.pins.edges == [(11, 3, 1)]
     rig.dev.pins.edges = None
     assert rig.dev.pins.eager[3] & 0xFF == 0
+
+
+def test_host_code_handles_edges_of_pins_that_only_replaced_watchers_watch(rig):
+    """Host code handles edges of a pin for native code until a watcher that it does not replace watches the pin, and
+    while edges are not logged. The interpreter always calls the watchers."""
+    pins, edges = rig.dev.pins, []
+
+    def replaced(*edge):
+        edges.append(edge)
+
+    for pin in ("RD1", "RD2"):
+        pins.watch(pin, replaced)
+    pins.handle_natively(3, 0x06, [replaced], 0x1000, 0x2000)
+    first = pins.native_cell(3).index
+    words = rig.record.u64[first : first + 3]
+    assert words.tolist() == [0x06, 0x1000, 0x2000]
+    rig.write("TRISD", 0)
+    rig.at(10).write("LATD", 0x06)
+    assert edges == [(11, 0x02, 0x06), (11, 0x04, 0x06)]
+    pins.edges = []
+    assert words[0] == 0
+    pins.edges = None
+    assert words[0] == 0x06
+    pins.watch("RD1", lambda *_edge: None)
+    assert words[0] == 0x04
+    words[0] = 0
+    pins.resume_native(3)
+    assert words[0] == 0x04

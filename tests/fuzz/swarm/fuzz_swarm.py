@@ -2,9 +2,9 @@
 
 Usage: `python tests/fuzz/swarm/fuzz_swarm.py [--trials N] [--seconds S]`. A trial is a scene of two or three robots
 with one or two random programs (`tests/arena/random_robots.py`), while the campaign sends messages to the robots and
-moves them. Modes: single quanta, lock-step in Python, compiled code with one thread and with several. Records, poses,
-registers and RAM must be equal to the bit. The summary counts events of the trials; a long campaign fails if a kind
-of event never occurred.
+moves them. Modes: single quanta with infrared edges in Python, lock-step in Python, compiled code with one thread and
+with several. Records, poses, registers and RAM must be equal to the bit. The summary counts events of the trials; a
+long campaign fails if a kind of event never occurred.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ import subprocess
 import sys
 import tempfile
 from collections import Counter
+from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any, Final
@@ -27,7 +28,9 @@ from arena.lockstep.scheduler import LockStep  # noqa: E402
 from arena.robots.firmware_controller import FirmwareController  # noqa: E402
 from arena.scene.loader import Scene, load_scene  # noqa: E402
 from arena.world.physics import World  # noqa: E402
+from emu.boards.epuck.analog import PULSE_PINS  # noqa: E402
 from emu.dspic30f.jit.engine import JitEngine  # noqa: E402
+from emu.peripherals.pins import parse_pin  # noqa: E402
 from tests.arena.random_robots import program  # noqa: E402
 from tests.fuzz.seeds import Campaign, parser  # noqa: E402
 
@@ -109,6 +112,8 @@ class Trial:
         scene, channel, world = self.scene, OpticalChannel.of(self.scene), World(self.scene, self.seed)
         several = enumerate(zip(self._images, self._selectors, strict=True))
         robots = [Robot(scene, self.seed, number, image, selector, channel) for number, (image, selector) in several]
+        if mode == STEPWISE:
+            leave_edges_to_python(robots)
         for robot in robots:
             assert isinstance(robot.machine.runner, JitEngine)
             robot.machine.runner.wait = self._waits
@@ -144,9 +149,17 @@ class Trial:
         return seen
 
 
+def leave_edges_to_python(robots: Sequence[FirmwareController]) -> None:
+    """Let Python handle every edge of the infrared emitters, which native code would handle otherwise."""
+    for robot in robots:
+        for port in {parse_pin(pin)[0] for pin in PULSE_PINS}:
+            robot.machine.peripherals.pins.handle_natively(port, 0, (), 0, 0)
+
+
 def state_of(until: int, tally: Counter[str], robot: FirmwareController) -> list[Any]:
     """Return the state of a robot between two quanta; inspecting it must not change the run."""
     machine = robot.machine
+    machine.peripherals.adc.catch_up(machine.cycle)
     tally["robots asleep"] += machine.is_asleep
     seen = [machine.cycle, machine.pc, hashlib.sha256(machine.record.bytes[:0x2800]).hexdigest()]
     if until % 2:

@@ -52,6 +52,26 @@ class RuleEmitter:
         """Emit an unsigned minimum."""
         return self.e.let(f"call i64 @llvm.umin.i64(i64 {wide(a)}, i64 {wide(b)})")
 
+    def can_call(self, code: Number) -> Number:
+        """Return whether the address of host code is not 0, so that native code can call it."""
+        return code != 0
+
+    def call(self, code: Number, data: Number, *numbers: Number) -> Value:
+        """Emit a call of host code. Everything that it reads has already been stored."""
+        address = self.e.name()
+        self.e.line(f"{address} = inttoptr i64 {wide(code)} to ptr")
+        passed = "".join(f", i64 {wide(number)}" for number in (data, *numbers))
+        return self.e.let(f"call i64 {address}(ptr %rec{passed})")
+
+    def notify(self, condition: Number, code: Number, data: Number, *numbers: Number) -> None:
+        """Emit a call of host code that is skipped unless `condition` holds."""
+        yes, done = self.e.fresh("yes"), self.e.fresh("done")
+        self.e.end(f"br i1 {truth(condition)}, label %{yes}, label %{done}")
+        self.e.start(yes)
+        self.call(code, data, *numbers)
+        self.e.end(f"br label %{done}")
+        self.e.start(done)
+
 
 class AccessContext(Protocol):
     """The part of an instruction's builder that `AccessEmitter` uses."""
@@ -106,6 +126,10 @@ class AccessEmitter(RuleEmitter):
         for number, value in enumerate(values[:-1]):
             found = self.select(index == number, value, found)
         return found
+
+    def notify(self, condition: Number, code: Number, data: Number, *numbers: Number) -> None:
+        """Defer the call to the end of the translated instruction."""
+        self._b.deferred.stores.append(lambda: RuleEmitter.notify(self, condition, code, data, *numbers))
 
     def post(self, slot: EventSlot, due: Number) -> None:
         """Defer the posting of an event. Native code returns after the instruction: the deadline may become earlier."""
@@ -205,17 +229,6 @@ class BoundaryEmitter(RuleEmitter):
         element = self.e.name()
         self.e.line(f"{element} = getelementptr [{len(values)} x i64], ptr {name}, i64 0, i64 {wide(index)}")
         return self.e.let(f"load i64, ptr {element}")
-
-    def can_call(self, code: Number) -> Number:
-        """Return whether the address of host code is not 0, so that native code can call it."""
-        return code != 0
-
-    def call(self, code: Number, data: Number, *numbers: Number) -> Value:
-        """Emit a call of host code. Everything that it reads has already been stored."""
-        address = self.e.name()
-        self.e.line(f"{address} = inttoptr i64 {wide(code)} to ptr")
-        passed = "".join(f", i64 {wide(number)}" for number in (data, *numbers))
-        return self.e.let(f"call i64 {address}(ptr %rec{passed})")
 
     def constants(self) -> str:
         """Return the IR of the constant arrays used so far."""

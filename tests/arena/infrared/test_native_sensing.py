@@ -1,0 +1,155 @@
+"""Native code handles infrared edges and begins quanta as Python does (light.c, ring.c, lockstep.c)."""
+
+from __future__ import annotations
+
+import math
+import random
+from collections import Counter
+from collections.abc import Callable
+from ctypes import CFUNCTYPE, c_double, c_int64, c_void_p
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from arena.infrared.channel import OpticalChannel
+from arena.infrared.ring import InfraredRing
+from arena.lockstep.scheduler import LockStep
+from arena.robots.firmware_controller import FirmwareController
+from arena.scene.loader import Scene, load_scene
+from arena.world.physics import World
+from emu.boards.epuck.analog import RESPONSE, Infrared, reflection_at
+from emu.boards.epuck.board import Epuck
+from emu.chips.dspic30f6014a import DSPIC30F6014A
+from emu.dspic30f.jit.engine import JitEngine
+from emu.machine.machine import Machine
+from tests.fuzz.swarm.fuzz_swarm import leave_edges_to_python
+
+QUANTA = 40
+SCANNER = """
+        .include "p30F6014A.inc"
+        .bss
+        .global _sum
+_sum:   .space  2
+        .text
+        .global _main, __ADCInterrupt
+_main:  mov     #0x00FF, w0
+        mov     w0, ADPCFG
+        mov     #0xFF00, w0
+        mov     w0, ADCSSL
+        mov     #{con2:#x}, w0          ; scan, interrupt after all results
+        mov     w0, ADCON2
+        mov     #{con3:#x}, w0
+        mov     w0, ADCON3
+        bclr    TRISF, #7
+        bclr    TRISF, #8
+        bclr    TRISG, #0
+        bclr    TRISG, #1
+        mov     #0x8000, w0             ; the port also has pins of a UART
+        mov     w0, U1MODE
+        bset    U1STA, #10
+        bset    IEC0, #11
+        mov     #0x80E4, w0
+        mov     w0, ADCON1
+        mov     #0x1234, w2
+1:      mov     #0xB400, w3             ; the next number of a shift register
+        lsr     w2, w2
+        btsc    SR, #0
+        xor     w2, w3, w2
+        mov     #0x0180, w0             ; toggle some pulse lines, often two of a port at once
+        and     w2, w0, w0
+        xor     LATF
+        and     w2, #3, w0
+        mov     #LATG, w8
+        xor     w0, [w8], [w8]
+        mov     #{wait}, w0
+        and     w2, w0, w0
+        repeat  w0
+        nop
+        bra     1b
+__ADCInterrupt:
+        bclr    IFS0, #11
+        mov     #ADCBUF0, w6
+        mov     _sum, w7
+        repeat  #15
+        add     w7, [w6++], w7
+        mov     w7, _sum
+        retfie
+"""
+
+
+def test_native_reflections_equal_those_of_python() -> None:
+    """The C function `reflect` gives the counts of `reflection_at` for all distances and shares."""
+    board, draw = Machine(DSPIC30F6014A, board=Epuck).board, random.Random(1)
+    _, reflect, record, ring = board.ir.native_handle()
+    native = CFUNCTYPE(None, c_void_p, c_void_p, c_int64, c_double, c_double)(reflect)
+    points = [near for near, _ in RESPONSE]
+    beyond = [math.nextafter(near, math.inf) for near in points]
+    for millimetres in (*points, *beyond, math.inf, *(draw.uniform(0, 110) for _ in range(500))):
+        share = draw.random()
+        native(record, ring, 3, millimetres, share)
+        assert board.ir.reflection[3] == round(reflection_at(millimetres) * share)
+
+
+def run(scene: Scene, image: Path, mode: str, monkeypatch: pytest.MonkeyPatch) -> tuple[list[Any], Counter[str]]:
+    """Run three robots with an image in a mode: "stepwise", "Python" or "native".
+
+    Return their states, and how often Python handled an edge or began a quantum.
+    """
+    calls, channel, world = Counter[str](), OpticalChannel.of(scene), World(scene, 1)
+
+    def count(owner: type, name: str) -> None:
+        function = getattr(owner, name)
+
+        def counted(*arguments: Any) -> Any:
+            calls[name] += 1
+            return function(*arguments)
+
+        monkeypatch.setattr(owner, name, counted)
+
+    count(Infrared, "_switched")
+    count(InfraredRing, "begin_quantum")
+    robots = [FirmwareController(scene, 1, number, image, 0, channel) for number in range(scene.robots.count)]
+    for robot in robots:
+        assert isinstance(robot.machine.runner, JitEngine)
+        robot.machine.runner.wait = True
+    if mode == "stepwise":
+        leave_edges_to_python(robots)
+    lockstep = LockStep(world, robots, channel, is_native=mode == "native", threads=2) if mode != "stepwise" else None
+    seen: list[Any] = []
+    for until in range(20, QUANTA + 1, 20):
+        if lockstep is not None:
+            lockstep.advance(until)
+        while world.ticks < until:
+            world.step([robot.control_step(world.ticks, world.poses) for robot in robots])
+        for robot in robots:
+            machine = robot.machine
+            machine.peripherals.adc.catch_up(machine.cycle)
+            memory = bytes(machine.record.bytes[: machine.record.data_end])
+            seen.append((until, machine.cycle, machine.pc, memory, robot.reading()))
+    monkeypatch.undo()
+    return seen, calls
+
+
+@pytest.mark.parametrize(("con2", "con3", "wait"), [
+    (0x041C, 0x1F13, 0x07FF),  # eight results in 4 ms: longer than a quantum
+    (0x0400, 0x1F3F, 0x1FFF),  # an interrupt after each result of 98 us, few edges
+    pytest.param(0x041C, 0x0201, 0x00FF, marks=pytest.mark.slow),  # fast conversions, a hundred edges in a quantum
+    (0x0000, 0x1F3F, 0x03FF),  # no scan
+])  # fmt: skip
+def test_native_code_equals_python(
+    con2: int, con3: int, wait: int, assembled: Callable[[str], Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Robots that toggle their pulse lines at random and convert all sensors have equal memories and readings, whether
+    Python or native code handles edges and begins quanta. Native code does nearly all of this itself."""
+    scene = load_scene("clustering").with_values(robots__count=3, objects__count=3, arena__width_cm=110.0,
+                                                 arena__height_cm=90.0, infrared__lost_share=0.2)  # fmt: skip
+    image = assembled(SCANNER.format(con2=con2, con3=con3, wait=wait))
+    expected, in_python = run(scene, image, "stepwise", monkeypatch)
+    assert len({seen[3] for seen in expected}) > len(expected) // 2
+    for mode in ("Python", "native"):
+        seen, calls = run(scene, image, mode, monkeypatch)
+        assert seen == expected
+    assert in_python["_switched"] > 100
+    assert calls["_switched"] < 0.1 * in_python["_switched"]
+    assert calls["begin_quantum"] < 0.5 * in_python["begin_quantum"]
