@@ -145,6 +145,8 @@ class Program:
                     found |= self._of_type(name)
                 else:
                     address = self.address(name, annotation)
+                    if address is None and annotation.kind == "targets" and self.sources.file_of(annotation) is None:
+                        continue  # the linker dropped the file that has the target
                     if address is None:
                         raise ToolError(f"{annotation.place}: {name} is neither a function nor a function type")
                     found.add(address)

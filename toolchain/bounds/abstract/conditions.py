@@ -199,4 +199,8 @@ def _narrow(condition: str, a: Value, b: Value) -> tuple[Value, Value] | None:
 
 
 def _clamp(value: Value, lo: int, hi: int) -> Value:
-    return interval(lo, hi, value.mask, value.bits, value.ram) if isinstance(value, Interval) else value
+    if not isinstance(value, Interval):
+        return value
+    if 0 < lo < value.least <= hi:
+        lo = value.least
+    return interval(lo, hi, value.mask, value.bits, value.ram)

@@ -12,19 +12,23 @@ Value = Any  # int | Interval
 
 
 class Interval:
-    """The integers in lo..hi whose bits under `mask` are `bits`; `ram`: members used as addresses are in RAM."""
+    """The integers in lo..hi whose bits under `mask` are `bits`.
 
-    __slots__ = ("bits", "hi", "lo", "mask", "ram")
+    ram    whether members used as addresses are in RAM
+    least  if above 0: every member is 0 or at least this, as the pointers of a function that may return NULL
+    """
 
-    def __init__(self, lo: int, hi: int, mask: int, bits: int, ram: bool = False) -> None:
-        self.lo, self.hi, self.mask, self.bits, self.ram = lo, hi, mask, bits, ram
+    __slots__ = ("bits", "hi", "least", "lo", "mask", "ram")
+
+    def __init__(self, lo: int, hi: int, mask: int, bits: int, ram: bool = False, least: int = 0) -> None:
+        self.lo, self.hi, self.mask, self.bits, self.ram, self.least = lo, hi, mask, bits, ram, least
 
     def __repr__(self) -> str:
         return f"{self.lo}..{self.hi}"
 
-    def key(self) -> tuple[int, int, int, int, bool]:
+    def key(self) -> tuple[int, int, int, int, bool, int]:
         """Return a key for equality of sets; `==` builds the comparison of the instruction table instead."""
-        return self.lo, self.hi, self.mask, self.bits, self.ram
+        return self.lo, self.hi, self.mask, self.bits, self.ram, self.least
 
     __hash__ = None  # type: ignore[assignment]
 
@@ -209,7 +213,18 @@ def union(a: Value, b: Value) -> Value:
         return a
     (la, ha), (lb, hb), (ma, ba), (mb, bb) = extremes(a), extremes(b), known_bits(a), known_bits(b)
     mask = ma & mb & ~(ba ^ bb)
-    return interval(min(la, lb), max(ha, hb), mask, ba & mask, is_ram_address(a) and is_ram_address(b))
+    result = interval(min(la, lb), max(ha, hb), mask, ba & mask, is_ram_address(a) and is_ram_address(b))
+    if isinstance(result, Interval) and result.lo == 0:
+        result.least = min(_least_but_zero(a), _least_but_zero(b))
+    return result
+
+
+def _least_but_zero(value: Value) -> int:
+    """Return a lower bound of the members except 0, of a set without negative numbers; 0 if only that is known."""
+    lo, hi = extremes(value)
+    if lo > 0 or hi == 0:
+        return lo or _NO_MEMBER
+    return value.least if isinstance(value, Interval) else 0
 
 
 def is_ram_address(value: Value) -> bool:
@@ -223,6 +238,7 @@ def key_of(value: Value) -> Any:
     return value.key() if isinstance(value, Interval) else int(value)
 
 
+_NO_MEMBER = 1 << 62
 WINDOW = 0x8000
 """First data address of the PSV window (isa.md §1.2)."""
 BIT = Interval(0, 1, -2, 0)

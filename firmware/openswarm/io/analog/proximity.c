@@ -23,6 +23,7 @@ uint8 Sys_Default_ProximityProcessor(uint8 sensor, uint16 counts)
         return 0;
     }
     uint8 row = 1;
+    LOOP_BOUND(19); /* TABLE_LAST - 1; not BOUNDS_AT: reflections.c includes this file */
     while (counts < table[row]) {
         row++;
     }
@@ -42,6 +43,7 @@ void proximity_measured(uint8 sensor, uint16 raw, bool lit)
         ambient[sensor] = raw;
     } else {
         reflection[sensor] = raw < ambient[sensor] ? (uint16)(ambient[sensor] - raw) : 0;
+        CALL_TARGETS(sys_proximity_processor);
         millimetres[sensor] = processor(sensor, reflection[sensor]);
     }
 }

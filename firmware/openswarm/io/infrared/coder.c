@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Hamming (15,11): bits 10-0 are data, 14-11 parity. Each bit has a position from 1 to 15; parity bits have the
  * powers of two. The XOR of the positions of all ones (the syndrome) is 0, or the position of the bit in error. */
+#include "hal_compiler.h"
 #include "infrared_parts.h"
 
 static const uint8 place_of[DATA_BITS] = {3, 5, 6, 7, 9, 10, 11, 12, 13, 14, 15};
@@ -37,6 +38,7 @@ uint16 coder_decode(uint16 word, uint8 *repairs)
     return word & 0x07FFu;
 }
 
+BOUNDS_AT("while (", loop 17); /* FRAME_HEADER + FRAME_PAYLOAD */
 uint16 coder_crc(const uint8 *bytes, uint8 size)
 {
     uint16 crc = 0xFFFFu;

@@ -8,7 +8,7 @@
 enum { HOUSEKEEPINGS = 64 /* per second */, DRAWN_AFTER = 16 };
 
 uint16 infrared_number;
-void (*infrared_event_sink)(const frame *f);
+frame_sink infrared_event_sink;
 
 static bool number_is_kept;
 static uint8 housekeepings;
@@ -17,6 +17,7 @@ static sys_message_processor message_processor;
 static sys_sending_processor sending_processor;
 static sys_leaving_processor leaving_processor;
 
+BOUNDS_AT("while (", loop 1); /* the e-puck never draws 0 twice in a row */
 static void draw_number(void)
 {
     if (!number_is_kept) {
@@ -26,6 +27,7 @@ static void draw_number(void)
     }
 }
 
+BOUNDS_AT("message_processor(&m)", calls sys_message_processor);
 static void pass_on(const frame *f, uint8 repairs, uint8 sensor, uint16 strength)
 {
     sys_neighbour_message m = {f->number, strength, sensor, repairs, f->size, {0}};
@@ -35,6 +37,7 @@ static void pass_on(const frame *f, uint8 repairs, uint8 sensor, uint16 strength
     }
 }
 
+BOUNDS_AT("infrared_event_sink(&f)", calls frame_sink);
 void infrared_received(const frame_buffer *b, uint8 sensor, uint16 strength)
 {
     frame f;
@@ -54,6 +57,7 @@ void infrared_received(const frame_buffer *b, uint8 sensor, uint16 strength)
     }
 }
 
+BOUNDS_AT("leaving_processor(payload", calls sys_leaving_processor);
 void infrared_leaving(uint8 *payload, uint8 size)
 {
     if (leaving_processor != NULL) {

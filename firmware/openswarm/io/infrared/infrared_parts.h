@@ -79,8 +79,8 @@ extern uint16 infrared_number;
 void infrared_received(const frame_buffer *b, uint8 sensor, uint16 strength);
 void infrared_leaving(uint8 *payload, uint8 size); /* a message before its first bit */
 void infrared_housekeeping(void);      /* 64 times per second */
-/* Takes frames of kind FRAME_EVENT; NULL unless remote_events.c is used. */
-extern void (*infrared_event_sink)(const frame *f);
+typedef void (*frame_sink)(const frame *f);
+extern frame_sink infrared_event_sink; /* takes frames of kind FRAME_EVENT; NULL unless remote_events.c is used */
 
 /* ---- neighbours.c ---- */
 void neighbours_heard(uint16 number, uint8 sensor, uint16 strength);

@@ -43,6 +43,7 @@ static uint8 sequence; /* devices locked */
 static sys_remote_statistics statistics;
 
 /* Returns the link to the gate of an event, or NULL. A gate behind its event belongs to a former event of its number. */
+BOUNDS_AT("for (event **link", loop b);
 static event **gate_of(uint16 id, bool in_front_only)
 {
     for (event **link = event_bucket(id); *link != NULL; link = &(*link)->next) {
