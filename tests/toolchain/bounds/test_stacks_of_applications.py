@@ -9,9 +9,12 @@ from pathlib import Path
 
 import pytest
 
-from bench.stacks import RETURN_ADDRESS, StackRow, rows_of, table
+from bench.stack_observer import RETURN_ADDRESS, Observer
+from bench.stacks import StackRow, rows_of, table
 from tests.firmware.conftest import Build, image
 from tests.fuzz.compiler.fuzz_bounds import examine
+from toolchain.bounds import interference
+from toolchain.bounds.interference import report_of
 from toolchain.bounds.preserved import PreservedRegisters
 from toolchain.bounds.program import Program
 from toolchain.bounds.report import Bound, BoundAnalysis
@@ -19,34 +22,67 @@ from toolchain.elf.read import read_executable
 
 CYCLES = 900_000
 """Long enough for the first line of listing1's log."""
+SHORT = 200_000
+"""Long enough for the first message of hello."""
 
 __all__ = ["image"]
 
 
-def exceeded(rows: list[StackRow]) -> list[str]:
-    return [row.name for row in rows if row.bound is not None and row.seen > row.bound]
+def program_of(path: Path) -> Program:
+    return Program(read_executable(path.read_bytes(), str(path)))
 
 
 @pytest.mark.slow
-def test_no_stack_and_no_handler_of_an_application_exceeds_its_bound(
-    image: Build, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_no_stack_of_an_application_exceeds_its_bound(image: Build, monkeypatch: pytest.MonkeyPatch) -> None:
     """Every stack of listing1 has a bound that covers what is measured; its thread alone needs exactly the bound.
 
     The thread's deepest call is snprintf, whose assembly shares W9 between its routines. An analysis that assumes all
     routines to preserve W8-W14 states less than the measurement.
     """
     path = image("listing1")
-    rows = {row.name: row for row in rows_of("listing1", path, CYCLES)}
-    assert not exceeded(list(rows.values()))
-    assert all(row.bound is not None for row in rows.values() if row.unit == "bytes"), rows
-    alone = rows["loggingThread alone"]
-    assert alone.bound == alone.seen == 88 + RETURN_ADDRESS
-    assert "| listing1 | `loggingThread alone` | 92 | 92 | bytes | 1.00 |" in table(list(rows.values()))
+    seen = Observer(path, program_of(path)).run(CYCLES)
+    report = report_of(program_of(path), ["main"])
+    for name, most in seen.stacks.items():
+        bound = report.stacks[name]
+        assert bound is not None
+        assert most <= bound, name
+    thread = next(row for row in report.threads if row.name == "loggingThread")
+    assert RETURN_ADDRESS + thread.bytes == seen.alone["loggingThread"] == 88 + RETURN_ADDRESS
     monkeypatch.setattr(PreservedRegisters, "changed_by", lambda _self, _entry: frozenset())
-    program = Program(read_executable(path.read_bytes(), str(path)))
+    program = program_of(path)
     planted = BoundAnalysis(program).bound("loggingThread", program.calls.named("loggingThread"), "thread")
-    assert RETURN_ADDRESS + planted.bytes < alone.seen
+    assert RETURN_ADDRESS + planted.bytes < seen.alone["loggingThread"]
+
+
+@pytest.mark.slow
+def test_interrupts_requested_in_the_deepest_moments_reach_nested_stacks(
+    image: Build, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Requested interrupts nest deeper than in the plain run and stay within every bound.
+
+    An analysis that forgets interrupts on top of others states less than what is measured.
+    """
+    path = image("hello")
+    rows = rows_of("hello", path, SHORT)
+    assert not [row for row in rows if row.is_exceeded]
+    assert {row.unit for row in rows} == {"bytes", "cycles"}
+    assert "| hello | `greet` | 70 | " in table(rows)
+    observer = Observer(path, program_of(path))
+    plain = dict(observer.run(SHORT).stacks)
+    nested = {row.name: row.seen for row in rows}
+    assert nested["greet"] > plain["greet"]
+    assert nested["kernel stack"] > plain["kernel stack"]
+    monkeypatch.setattr(interference, "_on_top", lambda _interrupts, _level: 0)
+    planted = report_of(program_of(path), ["main"]).stacks["greet"]
+    assert planted is not None
+    assert plain["greet"] <= planted < nested["greet"]
+
+
+def test_a_row_below_its_measurement_is_exceeded() -> None:
+    """A measurement above its bound is reported; a bound that is not known is not exceeded."""
+    assert not StackRow("a", "main", "bytes", None, 50).is_exceeded
+    assert not StackRow("a", "main", "bytes", 50, 50).is_exceeded
+    assert StackRow("a", "main", "bytes", 49, 50).is_exceeded
 
 
 def test_an_unsound_stack_of_a_random_program_is_found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
