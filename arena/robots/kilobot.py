@@ -64,7 +64,8 @@ class KilobotCrowd:
         setting = scene.kilobots
         self.swarm: Final = KilobotSwarm(
             [_setup(scene, seed, robot, image) for robot, image in zip(robots, images, strict=True)],
-            seed=seed, loss=setting.lost_share, reach=10 * setting.reach_cm,
+            seed=seed, loss=[(10 * cm, share) for cm, share in setting.lost_at] or setting.lost_share,
+            reach=10 * setting.reach_cm,
         )  # fmt: skip
         registers = WATCHED if setting.records_messages else [one for one in WATCHED if one not in _EMITTING]
         for machine in self.swarm.robots:

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping, Sequence
+from itertools import pairwise
 from typing import Any, Final
 
 from arena.scene import geometry
 from arena.scene.limits import LIMITS
 from arena.scene.robot_kind import KINDS
-from arena.scene.schema import INHERIT, NAMED, PLACES, ObjectKind, Points, RobotGroup
+from arena.scene.schema import INHERIT, NAMED, PLACES, Kilobots, ObjectKind, Points, RobotGroup
 from emu.boards.epuck.remote import KEYS
 from emu.boards.kilobot.messages import MOST_UID, TYPES
 
@@ -138,6 +139,19 @@ def overhead_commands(text: str) -> list[tuple[float, str, float]]:
             raise ValueError(part)
         found.append((start, words[1], seconds))
     return found
+
+
+def check_losses(errors: TableErrors, setting: Kilobots) -> None:
+    """Check the light pulses that Kilobots miss. Raises SceneError."""
+    points, words = setting.lost_at, ""
+    if any(len(point) != 2 or point[0] < 0 or not 0 <= point[1] < 1 for point in points):
+        words = "expected points [cm, share], with distances of 0 or more and shares of 0 to less than 1"
+    elif any(after[0] <= before[0] for before, after in pairwise(points)):
+        words = "expected rising distances"
+    elif points and setting.lost_share:
+        words = "replaces lost_share; remove one of them"
+    if words:
+        raise errors.at("kilobots", "lost_at", f"kilobots.lost_at: {words}")
 
 
 def check_overhead(errors: TableErrors, text: str) -> None:

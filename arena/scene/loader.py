@@ -21,6 +21,7 @@ from arena.scene.checks import (
     check_key,
     check_limits,
     check_links,
+    check_losses,
     check_off,
     check_overhead,
     check_polygon,
@@ -371,6 +372,7 @@ def _checked(scene: Scene, errors: TableErrors) -> Scene:
                         "a letter or digit first: results go into a folder of this name")  # fmt: skip
     check_key(errors, "start", scene.start.remote)
     check_overhead(errors, scene.kilobots.overhead)
+    check_losses(errors, scene.kilobots)
     for name in LISTS:
         table = {"groups": "robots", "kinds": "objects"}.get(name, name)
         for number, one in enumerate(getattr(scene, name)):

@@ -201,7 +201,8 @@ class Kilobots:
     - `motion_noise`: share of the motion, drawn every `noise_period_s` of [chassis]
     - `thrust_n`: force of the legs on the table while motors run; `brake_n`: force that pushes a robot at rest
     - `clock_sd`: standard deviation of the frequency of the oscillators
-    - `reach_cm`: range of infrared between two centres; `lost_share`: share of light pulses that a receiver misses
+    - `reach_cm`: range of infrared between two centres; `lost_share`: share of light pulses that a receiver misses;
+      `lost_at`: instead, that share by distance, [[cm, share], ...], linear between two points
     - `ambient_counts`: counts of the sensor of ambient light; a lamp that lowers an infrared sensor of an e-puck by C
       counts at 1 m raises them by `lamp_gain` C at 1 m, and with the inverse square of its distance
     - `overhead`: the overhead controller's commands as "SECOND COMMAND SECONDS; ...": from that second on it repeats
@@ -222,6 +223,7 @@ class Kilobots:
     clock_sd: float = 0.005
     reach_cm: float = 7.0
     lost_share: float = 0.0
+    lost_at: Points = ()
     ambient_counts: int = 300
     lamp_gain: float = 0.25
     overhead: str = "0.2 run 0.5"

@@ -25,7 +25,7 @@ typedef void (*message_rx_t)(message_t *, distance_measurement_t *);
 
 enum { NORMAL = 0, GPS = 1 };
 
-extern volatile uint32_t kilo_ticks; /* ticks of 32.768 ms since RUN, 30.5 a second */
+extern volatile uint32_t kilo_ticks; /* ticks of 32.768 ms since power-on, 30.5 a second */
 extern uint16_t kilo_tx_period;      /* a message is sent each time the ticks times 255 exceed it: 3906 is 0.524 s */
 extern uint16_t kilo_uid;            /* the robot's number in its EEPROM */
 extern uint8_t kilo_turn_left, kilo_turn_right, kilo_straight_left, kilo_straight_right; /* calibrated duties */

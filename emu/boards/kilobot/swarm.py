@@ -134,17 +134,19 @@ class KilobotSetup:
 
 
 class KilobotSwarm:
-    """Kilobots at power-on. `loss`: part of the pulses, 0 to 1, that a receiver misses. `delay`: ticks of 1/8 MHz after
-    which light reaches other robots, 16 or more. Raises ValueError.
+    """Kilobots at power-on. `loss`: part of the pulses, 0 to 1, that a receiver misses, or a curve over the distance:
+    points (mm, part), linear between them and constant beyond. `delay`: ticks of 1/8 MHz after which light reaches
+    other robots, 18 or more. Raises ValueError.
     """  # fmt: skip
 
-    def __init__(self, robots: Sequence[KilobotSetup], *, seed: int = 1, loss: float = 0.0, delay: int = 32,
-                 reach: float = REACH_MM) -> None:  # fmt: skip
-        if not 0 <= loss < 1:
-            raise ValueError(f"a loss of {loss} is not within 0 and 1")
+    def __init__(self, robots: Sequence[KilobotSetup], *, seed: int = 1, loss: float | Sequence[Sequence[float]] = 0.0,
+                 delay: int = 32, reach: float = REACH_MM) -> None:  # fmt: skip
+        curve = np.array([(0.0, loss)] if isinstance(loss, int | float) else loss, dtype=float).T
+        if not ((curve[1] >= 0) & (curve[1] < 1)).all() or not (np.diff(curve[0]) > 0).all():
+            raise ValueError(f"a loss of {loss} is not within 0 and 1, at rising distances")
         if delay < 2 * PULSE_TICKS:
             raise ValueError(f"a delay of {delay} ticks is less than {2 * PULSE_TICKS}")
-        self._loss, self._reach = int(loss * LOSS_ONE), reach
+        self._loss, self._reach = curve, reach
         self.places = np.array([(robot.x, robot.y) for robot in robots], dtype=float).reshape(-1, 2)
         """Positions of the centres in mm; `move` and `move_all` change them."""
         self.now = 0
@@ -187,8 +189,9 @@ class KilobotSwarm:
             strengths = np.where(distances <= self._reach, _microvolts_by_distance(gain, distances), 0)
             self._table[moved, :, field] = strengths
             self._table[:, moved, field] = strengths.T
-        self._table[moved, :, 2] = self._loss
-        self._table[:, moved, 2] = self._loss
+        losses = (np.interp(distances, *self._loss) * LOSS_ONE).astype(np.uint32)
+        self._table[moved, :, 2] = losses
+        self._table[:, moved, 2] = losses.T
 
     def move(self, robot: int, x: float, y: float) -> None:
         """Move a robot to a position in mm, at once."""

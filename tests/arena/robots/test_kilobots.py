@@ -205,6 +205,9 @@ def test_wrong_values_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture[
     assert "a Kilobot runs an `image`" in refused(tmp_path, '[[robots]]\nkind = "kilobot"\ncontroller = "A"\n')
     for text in ("1 run", "1 go 2", "1 run 2; 2 sleep 1", "x run 1", "1 run nan"):
         assert "kilobots.overhead: " in refused(tmp_path, f'[kilobots]\noverhead = "{text}"\n')
+    for text, words in (("[[3, 1.5]]", "shares of 0"), ("[[3, 0.1], [2, 0.1]]", "rising"), ("[3]", "expected a list")):
+        assert words in refused(tmp_path, f"[kilobots]\nlost_at = {text}\n")
+    assert "replaces lost_share" in refused(tmp_path, "[kilobots]\nlost_share = 0.1\nlost_at = [[3, 0.1]]\n")
     group = '[[robots]]\nkind = "kilobot"\nimage = "gradient"\n'
     for line in ('stimulus = "x"', "selector = 3", 'remote = "ok"'):
         assert f"robots.{line.split()[0]} has no effect on a Kilobot" in refused(tmp_path, f"{group}{line}\n")
@@ -221,7 +224,7 @@ def test_wrong_values_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture[
     assert "--brain gradient cannot run on robots of two kinds" in capsys.readouterr().err
     path.write_text('name = "test"\n[[robots]]\nkind = "kilobot"\nimage = "nothing.hex"\n')
     assert main(["run", str(path), "--out", str(tmp_path / "out")]) == 2
-    assert "expected an ELF or HEX file for AVR, or one of edge, gradient, orbit, " in capsys.readouterr().err
+    assert "expected an ELF or HEX file for AVR, or one of counts, edge, gradient, orbit, " in capsys.readouterr().err
 
 
 def test_a_debugger_refuses_a_kilobot(capsys: pytest.CaptureFixture[str]) -> None:
