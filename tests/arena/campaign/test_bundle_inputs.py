@@ -8,8 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from arena.campaign.bundle import INDEX_LIMIT
+from arena.campaign.bundle import INDEX_LIMIT, unpack
 from arena.cli import main
+from arena.trial.record import RecordError
 
 
 @pytest.fixture
@@ -49,6 +50,21 @@ def test_an_index_of_blanks_is_refused(tmp_path: Path, capsys: pytest.CaptureFix
         archive.writestr("bundle.json", " " * INDEX_LIMIT + json.dumps({"files": {}}))
     assert main(["verify", str(path)]) == 2
     assert "bundle.json is larger than 16 MB" in capsys.readouterr().err
+
+
+def test_a_bundle_that_unpacks_to_too_much_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The sizes in the archive's directory count; zipfile unpacks no more of a member than they say."""
+    path, folder = tmp_path / "large.zip", tmp_path / "unpacked"
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("bundle.json", json.dumps({"files": {"run/a": "", "run/b": ""}}))
+        for name in ("run/a", "run/b"):
+            archive.writestr(name, b"")
+            archive.infolist()[-1].file_size = 1 << 31
+    assert main(["verify", str(path)]) == 2
+    assert "would unpack to more than 4 GB" in capsys.readouterr().err
+    with pytest.raises(RecordError, match="would unpack to more than 4 GB"):
+        unpack(path, folder)
+    assert not folder.exists()
 
 
 @pytest.mark.parametrize("name", ["/dev/zero", "nothing.zip"])
