@@ -29,17 +29,17 @@ from toolchain.bounds.program import Program  # noqa: E402
 from toolchain.bounds.report import BoundAnalysis  # noqa: E402
 from toolchain.elf.read import read_executable  # noqa: E402
 
-APART = ("refuse_message", "os_fail", "os_refuse")
+EXCLUDED = ("refuse_message", "os_fail", "os_refuse")
 """Functions that are called only on paths excluded from the column "plain"."""
 PLAIN = {"x": 0, "j": 0}
 """Additional limits of plain paths: no hole is larger than the reserve, and no free run is pending."""
-ITSELF = "os_thread_returned"
+THREAD_END = "os_thread_returned"
 """Function through which a thread ends itself and continues in the scheduler; this path has its own row."""
-TREE = ("find_hole", "remove_hole", "insert_hole")
+TREE_FUNCTIONS = ("find_hole", "remove_hole", "insert_hole")
 """Functions that change the heap's tree; the tree is consistent at the entry of each."""
-EXCHANGE = "swap_reserve"
+RESERVE_SWAP = "swap_reserve"
 """Function that removes a hole only if it is larger than the reserve."""
-ALSO = ("_end_thread",)
+ALSO_TIMED = ("_end_thread",)
 """Functions that are timed although they are not kernel calls."""
 SWITCHES = ("hal_yield", "hal_block", "hal_abandon")
 TARGET = "../tests/firmware/target"
@@ -101,7 +101,7 @@ class CallMeter:
     structures: Structures
     worst: dict[tuple[str, bool], tuple[int, dict[str, int]]] = field(default_factory=dict)
     """Cycles of the longest run and the maxima during it, by (function, whether its path is plain)."""
-    under_way: list[OpenCall] = field(default_factory=list)
+    open_calls: list[OpenCall] = field(default_factory=list)
     watched: set[int] = field(default_factory=set)
 
     def entry_hook(self, name: str) -> Callable[[], bool]:
@@ -111,7 +111,7 @@ class CallMeter:
             machine = self.machine
             top = machine.w[15]
             back = machine.peek(top - 4) | (machine.peek(top - 2) & 0x7F) << 16
-            self.under_way.append(OpenCall(name, top - CALL_BYTES, machine.cycle))
+            self.open_calls.append(OpenCall(name, top - CALL_BYTES, machine.cycle))
             self.record_sizes()
             if back not in self.watched:
                 self.watched.add(back)
@@ -123,11 +123,11 @@ class CallMeter:
     def leave(self) -> bool:
         """Record the duration of the calls that return to this address; hook of that address."""
         top = self.machine.w[15]
-        ended = [one for one in self.under_way if one.top == top]
+        ended = [one for one in self.open_calls if one.top == top]
         if ended:
             self.record_sizes()
         for one in ended:
-            self.under_way.remove(one)
+            self.open_calls.remove(one)
             if one.counts:
                 key, cycles = (one.name, one.plain), self.machine.cycle - one.start
                 if cycles > self.worst.get(key, (0, {}))[0]:
@@ -137,7 +137,7 @@ class CallMeter:
     def record_sizes(self) -> None:
         """Record the sizes of all structures for all calls in progress."""
         found = self.structures.sizes()
-        for one in self.under_way:
+        for one in self.open_calls:
             _merge(one.most, found)
 
     def set_newest_pid(self) -> bool:
@@ -160,13 +160,13 @@ class CallMeter:
 
     def discard_calls(self) -> bool:
         """Discard the calls in progress: an interrupt or a thread switch disturbs them."""
-        for one in self.under_way:
+        for one in self.open_calls:
             one.counts = False
         return False
 
     def mark_not_plain(self) -> bool:
         """Mark the calls in progress as not plain."""
-        for one in self.under_way:
+        for one in self.open_calls:
             one.plain = False
         return False
 
@@ -184,15 +184,15 @@ def measure(path: Path, program: Program, names: list[str], seconds: float) -> C
     meter = CallMeter(machine, Structures(machine))
     for handler, _, _ in program.interrupts():
         machine.hook_pc(handler, meter.discard_calls)
-    for hooked, hook in ((SWITCHES, meter.discard_calls), (APART, meter.mark_not_plain)):
+    for hooked, hook in ((SWITCHES, meter.discard_calls), (EXCLUDED, meter.mark_not_plain)):
         for name in hooked:
             address = program.address(name)
             if address in program.calls.entries:
                 machine.hook_pc(address, hook)
     if program.address(ROUND) in program.calls.entries:
         machine.hook_pc(ROUND, meter.set_newest_pid)
-    exchange = _extent(program, EXCHANGE)
-    for name in TREE:
+    exchange = _extent(program, RESERVE_SWAP)
+    for name in TREE_FUNCTIONS:
         address = program.address(name)
         if address in program.calls.entries:
             machine.hook_pc(address, meter.tree_change_hook(exchange if name == "remove_hole" else range(0)))
@@ -216,11 +216,12 @@ def rows_of(app: str, path: Path, values: dict[str, int], seconds: float) -> lis
     """Return the rows of all kernel calls in one image."""
     image = read_executable(path.read_bytes(), str(path))
     bare = Program(image, values)
-    names = [*bare.default_functions("_Sys_"), *(name for name in ALSO if bare.address(name) in bare.calls.entries)]
+    also = [name for name in ALSO_TIMED if bare.address(name) in bare.calls.entries]
+    names = [*bare.default_functions("_Sys_"), *also]
     meter = measure(path, bare, names, seconds)
     seen = meter.worst
-    there = [name for name in (ITSELF, *APART) if bare.address(name) in bare.calls.entries]
-    itself = [name for name in there if name == ITSELF]
+    there = [name for name in (THREAD_END, *EXCLUDED) if bare.address(name) in bare.calls.entries]
+    itself = [name for name in there if name == THREAD_END]
 
     def bound(name: str, limits: dict[str, int], left_out: list[str]) -> int | None:
         program = Program(image, values | limits, left_out)

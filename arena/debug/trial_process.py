@@ -63,7 +63,7 @@ class _PipeInbox(SimpleQueue[Message | None]):
         self.count += 1
         return message
 
-    def decision(self) -> Any:
+    def next_tuple(self) -> Any:
         """Return the next tuple from the pipe; queue the messages that arrive before it."""
         while not isinstance(received := self.pipe.receive()[0], tuple):
             self._pending.append(received)
@@ -136,7 +136,7 @@ class CheckpointedRobot(ControlledRobot):
         """End this process in favour of a checkpoint; without a checkpoint, run the trial again from its seed."""
         inbox = self.channel.inbox
         self.send("rewind", cycle, inbox.count)
-        (has_checkpoint,) = inbox.decision()
+        (has_checkpoint,) = inbox.next_tuple()
         if has_checkpoint:
             self.send("leaves", session_state, inbox.pending())
             os._exit(0)

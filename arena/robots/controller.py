@@ -56,7 +56,7 @@ class LedChange(NamedTuple):
 
 @dataclass(slots=True)
 class Reading:
-    """What a sample records of a robot, beside its pose."""
+    """Values of one robot in a sample of the record, in addition to its pose."""
 
     seen: int = NOTHING
     """Last answer of the line-of-sight sensor; -1 if the controller does not publish it."""

@@ -52,7 +52,7 @@ class Action(NamedTuple):
 
 
 class RewindState(NamedTuple):
-    """What a checkpoint must know to continue in place of this process: actions, breakpoints, epoch and target."""
+    """State with which a checkpoint replaces this process: actions, breakpoints, epoch and target."""
 
     actions: list[Action]
     breakpoints: list[tuple[int, str]]

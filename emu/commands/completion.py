@@ -18,7 +18,7 @@ def parser() -> Parser:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Print the script. Return the exit status given in the parser's description."""
+    """Print the completion script and return 0."""
     commands = {name: (import_module(f"emu.commands.{name}").parser(), text) for name, text in COMMANDS.items()}
     print(script("emu", commands, options.shell))
     return DONE

@@ -84,7 +84,7 @@ CHECKS: Final = {
 }
 """Causes by clang's SanitizerHandler number (clang 20, CodeGen/SanitizerHandler.h).
 
-The tests compile the usual ones. A report shows a number that is not listed as it is.
+The tests compile the usual checks. For a number that is not listed, a report shows the number.
 """
 VECNUM: Final = 0x3F
 """Field of INTTREG with the vector number of the last exception entered (isa.md §14.4)."""

@@ -45,7 +45,7 @@ def parse_image(data: bytes, name: str, chip: Chip | None = None) -> Image:
         from emu.image.hex import read_hex
 
         return read_hex(data, name, chip or chip_named())
-    raise LoadError(name, _what_it_is(data))
+    raise LoadError(name, _unknown_format(data))
 
 
 def _contents(name: str) -> bytes:
@@ -64,7 +64,7 @@ def _contents(name: str) -> bytes:
     return data
 
 
-def _what_it_is(data: bytes) -> str:
+def _unknown_format(data: bytes) -> str:
     """Return the error message for a file that is neither ELF nor HEX."""
     if not data:
         return f"is empty; {EXPECTED}"

@@ -66,7 +66,7 @@ class PreservedRegisters:
         return self._changed[entry]
 
     def _callees(self, entry: int) -> list[int]:
-        """Return the function and its direct callees that are not analysed yet, with an initial empty result."""
+        """Return the functions reachable from `entry` that have no result yet, and set their results to empty."""
         found, work = [], [entry]
         while work:
             function = work.pop()

@@ -10,7 +10,7 @@ from arena.experiments import Curve, Floats, Measure, TrialSamples
 from arena.metrics import MetricSeries
 
 BEGIN_S = 10.0
-"""Time of the trial from which the distance counts: RUN, and the first turn."""
+"""Time of the trial from which the distance counts. Before, the planet receives RUN and turns into its orbit."""
 
 CURVES = [
     Curve("distance", "distance of the planet", "mm", 10, reference=(60.0, "60 mm (Kilobotics, lab 4)")),

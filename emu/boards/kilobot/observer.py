@@ -1,4 +1,4 @@
-"""Report of a Kilobot: what its LED, motors, UART and infrared emitter do, from changes of registers.
+"""Observer of a Kilobot: reports of its LED, motors, UART and infrared messages, from changes of registers.
 
 Input: `Change`s of one robot. Output: `Report`s in order of time. Pins: kilobot.md §1.
 """

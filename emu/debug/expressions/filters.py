@@ -67,7 +67,7 @@ def _made(
     inspector: Inspector, operand: list[Token], operator: str, literal: str, address: int | None
 ) -> Comparison | None:
     """Return the comparison of an operand with a literal, if C compares the two as mathematics does."""
-    place = _place(inspector, operand, address)
+    place = _operand_comparison(inspector, operand, address)
     if place is None:
         return None
     try:
@@ -79,18 +79,18 @@ def _made(
     return replace(place, operator=operator, number=number) if low <= number <= high else None
 
 
-def _place(inspector: Inspector, operand: list[Token], address: int | None) -> Comparison | None:
-    """Return an unfinished comparison that describes where an operand is; None if that depends on memory."""
+def _operand_comparison(inspector: Inspector, operand: list[Token], address: int | None) -> Comparison | None:
+    """Return a comparison with only the location of an operand filled in; None if the location depends on memory."""
     if address is None:
         found = _object(inspector, operand, None)
-        return None if found is None else _described(inspector, found, None)
+        return None if found is None else _comparison_of(inspector, found, None)
     one, other = (_object(inspector, operand, frame) for frame in _frames(inspector, address))
     if one is None or other is None:
         return None
     if one.address == other.address or one.address is None or other.address is None:
-        return _described(inspector, one, None)
+        return _comparison_of(inspector, one, None)
     base, rest = divmod(other.address - one.address, 2)
-    return None if rest or not 0 < base <= REGISTERS else _described(inspector, one, base - 1)
+    return None if rest or not 0 < base <= REGISTERS else _comparison_of(inspector, one, base - 1)
 
 
 def _frames(inspector: Inspector, address: int) -> tuple[Frame | None, Frame | None]:
@@ -119,8 +119,8 @@ def _object(inspector: Inspector, operand: list[Token], frame: Frame | None) -> 
     return None
 
 
-def _described(inspector: Inspector, found: Value, base: int | None) -> Comparison | None:
-    """Return the unfinished comparison of a number, None if native code cannot read it.
+def _comparison_of(inspector: Inspector, found: Value, base: int | None) -> Comparison | None:
+    """Return a comparison with only the location of a number filled in; None if native code cannot read the number.
 
     With `base`, its address lies at a constant distance from the value of that W register.
     """

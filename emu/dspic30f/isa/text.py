@@ -93,7 +93,7 @@ class Parsed:
 def _reason(error: EncodeError) -> str:
     if error.clause is not None:
         return EXPLANATION.get(error.clause.text, f"{error.clause.text} does not hold")
-    if error.letter == "t":  # W16 would be the high half
+    if error.letter == "t":  # a pair from W15 on, whose high half would be W16
         return EXPLANATION["v even"]
     if error.letter in ("s", "d"):
         return f"w{error.value} is not an even register"

@@ -5,7 +5,7 @@
 #include <p30F6014A.h>
 #include <stdint.h>
 
-#ifndef OS_ISR /* Microchip's header does not have this spelling */
+#ifndef OS_ISR /* Microchip's headers do not define this macro */
 #define OS_ISR(name) void __attribute__((__interrupt__, __no_auto_psv__)) name(void)
 #endif
 

@@ -429,14 +429,14 @@ class LlvmBuilder:
         self.deferred.check_interrupts = True
 
     def _store_flags(self, address: int, placed: Number, free: int) -> None:
-        """Defer the record of the cycle in which software sets an interrupt flag; at most one flag may be set."""
+        """Defer the store of the cycle in which software requests an interrupt by its flag; one flag at most."""
         old = self.e.load(pointer(self.e, address), 16)
         rises = placed & free & (old ^ 0xFFFF)
         self.guard((rises & (rises - 1)) == 0)
-        self.deferred.stores.append(lambda: self._rise(address, rises))
+        self.deferred.stores.append(lambda: self._store_request_cycle(address, rises))
 
-    def _rise(self, address: int, rises: Number) -> None:
-        """Emit the request cycle of a flag that software sets: the next cycle. At most one flag is set."""
+    def _store_request_cycle(self, address: int, rises: Number) -> None:
+        """Emit the store of the request cycle, which is the next one, if software sets a flag; one flag at most."""
         bit = self.ctz16(rises | 0x8000)
         since = pointer(self.e, (bit << 3) + self.layout.offset["irq.since"] + 8 * flag_row(address))
         self.e.store(since, self.select(rises == 0, self.e.load(since, 64), self.now + 1), 64)

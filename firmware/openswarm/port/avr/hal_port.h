@@ -21,7 +21,7 @@
 typedef uint16_t hal_lock_state;
 typedef uint8_t *hal_limit;     /* lowest byte of the stack */
 
-enum { CPU_WAS_OPEN = 1 << 8, CPU_OPEN = 1 << 0, CPU_DUE = 1 << 1, CPU_OVER = 1 << 3, CPU_FORCED = 1 << 4, CPU_I = 1 << SREG_I }; /* switch.S has the numbers */
+enum { CPU_WAS_OPEN = 1 << 8, CPU_OPEN = 1 << 0, CPU_DUE = 1 << 1, CPU_OVER = 1 << 3, CPU_FORCED = 1 << 4, CPU_I = 1 << SREG_I }; /* switch.S repeats the values */
 
 #define HAL_THREAD_LEVEL (CPU_WAS_OPEN | CPU_I)
 
