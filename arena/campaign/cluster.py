@@ -35,8 +35,8 @@ def run_on(
 ) -> None:
     """As `campaign.run_all`, on the workers of the scheduler at an address such as tcp://host:8786.
 
-    Progress is reported per trial. Raises ValueError without Dask or for workers of another version, OSError if the
-    scheduler cannot be reached, ClusterLostError if the connection is lost, and what a trial raises."""
+    Progress is reported per trial. Raises the exceptions of a trial, ValueError without Dask or for workers of another
+    version, OSError if the scheduler cannot be reached, ClusterLostError if the connection is lost."""
     try:
         from distributed import CancelledError, Client, KilledWorker, as_completed
         from distributed.comm.core import CommClosedError

@@ -1,8 +1,8 @@
 """Debugger control of one robot of a trial: the whole world pauses with the robot, and the record is unaffected.
 
-Two greenlets take part: the trial's, in which the robot runs, and the debugger's. The machine runs forward only in the
-trial's greenlet, at most to the next end of a quantum, so all its inputs come from the world as usual. Between two such
-runs the debugger decides how far the machine may run.
+There are two greenlets: that of the trial, in which the robot runs, and that of the debugger. The machine runs forward
+only in the trial's greenlet, at most to the next end of a quantum. All its inputs therefore come from the world.
+Between two such runs, the debugger decides how far the machine may run.
 
 The inputs of the robot are logged (`InputLog`). The debugger's greenlet can therefore run the past of the robot again
 without the world, which stays in the present. If the user inspects the world of the past, or changes the past,

@@ -30,11 +30,11 @@ class Traits(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Drive:
-    """How two commanded values, left and right, move a body.
+    """Drive of a body, which two commanded values control: left and right.
 
-    With an `axle_cm` they are speeds of wheels in cm/s. Without one they are values of two vibration motors: both move
-    the body ahead by `ahead` cm/s per unit of the smaller value, and the rest of the larger one turns it by `turn`
-    rad/s per unit about a leg on the other side, `leg_back_cm` behind and `leg_aside_cm` beside the centre.
+    With an `axle_cm` they are speeds of wheels in cm/s. Without one they are values of two vibration motors. Both move
+    the body ahead by `ahead` cm/s per unit of the smaller value. The excess of the larger value turns the body by
+    `turn` rad/s per unit about a leg on the other side, `leg_back_cm` behind and `leg_aside_cm` beside the centre.
     """
 
     thrust_n: float

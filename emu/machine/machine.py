@@ -404,9 +404,9 @@ class Machine(StateAccess):
     def _bring_devices_to_present(self) -> None:
         """Fire the events due by the present cycle, so that an observer sees every device in its present state.
 
-        Every observer is called after this function: hooks, conditions, and callers between two runs. It has no
-        effect on the run: the events of the present cycle precede the accesses of the next instruction anyway, and
-        those due in the very cycle that a sleeping CPU has reached are left to the next run. Raises DeviceReset.
+        It runs before every call of an observer: hooks, conditions, and code of the caller between two runs. It does
+        not change the run, because the events of the present cycle precede the accesses of the next instruction. If
+        the CPU sleeps, the events due in the present cycle are left to the next run. Raises DeviceReset.
         """
         u64, now, _, mode = self._clock
         cycle = u64[now]
@@ -456,8 +456,8 @@ class Machine(StateAccess):
     def _has_restarted(self) -> bool:
         """Whether the PC has reached address 0 without a reset.
 
-        Right after a reset the cycle is still that of the reset, or the clock has started up in the meantime and no W
-        register has been written.
+        Right after a reset, the cycle is that of the reset. If the clock had to start up, the cycle is later, but no W
+        register has been written yet.
         """
         if not self.stop_on_fault or self.state.pc or self.state.initialised == W15_INITIALISED:
             return False

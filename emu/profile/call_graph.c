@@ -3,8 +3,8 @@
 
    A return belongs to the call that stored its return address where the return reads it. If that address is on another
    stack, the return is a thread switch. The frames above it are dropped. Time in Sleep, in interrupts and in other
-   threads is attributed to no function. A caller of the idle function, which waits in a loop, is not charged for the
-   time from its first call of it to the end of its last one. */
+   threads is attributed to no function. Nor is the time of a loop that calls the idle function, from its first call to
+   the end of its last one. */
 typedef unsigned char u8;
 typedef unsigned short u16;
 typedef unsigned int u32;

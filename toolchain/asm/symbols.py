@@ -1,7 +1,7 @@
 """Symbols, locations and values of expressions while a file is being assembled.
 
 The value of an expression is an `int`, a `SymbolValue` (symbol - symbol + offset under an optional operator), or a
-`PendingOperation` whose operands become numbers when all labels have their final location.
+`PendingOperation`. The operands of the latter become numbers when all labels have their final location.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """Attribute `externally_initialized` for variables in unoptimised IR that the start-up code does not initialise.
 
 `persistent` and `noload` variables start with the previous content of RAM. Without the mark, the middle end assumes the
-value of the definition. It turns a variable that is compared with one constant and set to it into a boolean, and a
-store in a `user_init` function into an initial value.
+value of the definition. If a program only sets a variable to one constant and compares it with that constant, the
+middle end turns the variable into a boolean. It also turns a store in a `user_init` function into an initial value.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """-fshort-double: double and long double have 32 bits, XC16's default for double.
 
-Clang computes with 32 bits (`FLAGS`). The run-time library keeps 64-bit functions under the names of C, so the IR of a
-program calls the single-precision functions instead (`rename`), and the link takes variants of printf and scanf.
+Clang computes with 32 bits (`FLAGS`). The run-time library keeps 64-bit functions under the names of C. Therefore
+`rename` makes the IR of a program call the single-precision functions, and the link uses variants of printf and scanf.
 A symbol marks the objects, because objects with 32-bit and 64-bit double must not pass each other doubles.
 """
 

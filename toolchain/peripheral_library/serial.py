@@ -296,8 +296,8 @@ unsigned int SlavegetsI2C(unsigned char *rdptr, unsigned int i2c_data_wait)
 """
 """Functions of the I2C module.
 
-`MasterputsI2C` returns -3 after a write collision. `MastergetsI2C` acknowledges every byte but the last one and returns
-the number of bytes that it did not receive, `SlavegetsI2C` the number of those it received until the stop condition."""
+`MasterputsI2C` returns -3 after a write collision. `MastergetsI2C` acknowledges every byte but the last one; it returns
+the number of bytes that it did not receive. `SlavegetsI2C` returns the number of bytes received until the Stop."""
 
 
 def uart(chip: Chip) -> Iterator[str]:

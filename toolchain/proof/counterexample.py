@@ -1,7 +1,7 @@
 """Counterexamples: an input for which code and IR differ, and an image that starts with it.
 
-In: a model of the solver.  Out: registers and RAM bytes at the function's first instruction, and an ELF file that sets
-them, calls the function and stops at `__returned`, for the emulator and its debugger.
+In: a model of the solver.  Out: registers and RAM bytes at the function's first instruction, and an ELF file for the
+emulator and its debugger.  The program in the file sets them, calls the function and stops at `__returned`.
 """
 
 from __future__ import annotations

@@ -1,10 +1,10 @@
 """Proof by induction of loops with input-dependent iteration counts.
 
-The invariants of a loop head state that, whenever the source is there, the code is at one address, and certain
-registers and frame words hold certain values of the source.  Candidates for these invariants come from sample runs with
-random inputs (`invariants.py`).  Candidates that an iteration does not preserve are dropped until the others are
-inductive.  With the invariants, each segment from the entry or a loop head to the next loop head or return is proved
-like a function without loops.
+An invariant holds whenever the source is at a loop head.  One states the address at which the code then is; the others
+state which registers and frame words hold which values of the source.  Sample runs with random inputs give candidates
+(`invariants.py`).  Candidates that an iteration does not preserve are dropped until the others are inductive.  With the
+invariants, each segment from the entry or a loop head to the next loop head or return is proved like a function without
+loops.
 
 A failed induction does not refute the function: a necessary invariant may be missing.
 """

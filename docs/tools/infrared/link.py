@@ -126,10 +126,10 @@ def facing(distance: float, turned: float = 0.0) -> Poses:
 
 
 class Expected(NamedTuple):
-    """Expected errors of a receiver whose preamble is found.
+    """Expected errors of a receiver that has found the preamble.
 
-    `repaired` is the number of repaired bits per bit of intact frames, `low` and `high` those of the phases at 10 and
-    90 %, `intact` the share of intact frames, `ideal` the bit error rate without transitions of light."""
+    `repaired` is the number of repaired bits per bit of intact frames; `low` and `high` are those of the phases at 10
+    and 90 %. `intact` is the share of intact frames, `ideal` the bit error rate without transitions of light."""
 
     repaired: float
     low: float

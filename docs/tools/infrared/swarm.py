@@ -44,22 +44,27 @@ WARM_S = 0.5
 
 @dataclass(frozen=True)
 class SwarmResult:
-    """Result for a swarm.
-
-    Robots, mean number of robots in reach, messages sent, possible receptions in reach, receptions in reach, receptions
-    from beyond, duplicates, mean and maximum ms from queueing to the handler, and a hash of all counters.
-    """
+    """Result for a swarm."""
 
     robots: int
     reached: float
+    """Mean number of robots in reach of a robot."""
     sent: int
+    """Messages sent."""
     possible: int
+    """Receptions that are possible in reach."""
     arrived: int
+    """Receptions in reach."""
     beyond: int
+    """Receptions from senders out of reach."""
     twice: int
+    """Messages that a robot received more than once."""
     ms: float
+    """Mean time in ms from queueing to the handler."""
     most_ms: int
+    """Maximum of that time."""
     everything: str
+    """Hash of all counters."""
 
 
 def grid(robots: int) -> Poses:

@@ -5,11 +5,11 @@
  * Three levels of exclusion. The slice interrupt and everything that runs on the kernel stack outside ISRs is level
  * "slice"; ISRs that use the kernel are level "device". Code of a level cannot be interrupted by its own level.
  *
- * What is a single act, that is, cannot be interrupted half-way: the load or the store of one byte, on every CPU.
- * The load or store of a word (a pointer, or 16 bits) is one act on some CPUs and several on others, so that what
- * ISRs share with lower levels without a lock is read and written through HAL_LOAD and HAL_STORE below. Reading,
- * changing and writing back is a single act on no CPU: it takes a lock. ISRs of level device use plain accesses,
- * nothing interrupts them that shares.
+ * Atomic accesses, which no interrupt can divide: the load or the store of one byte is atomic on every CPU, that of a
+ * word (a pointer, or 16 bits) only on some. HAL_LOAD and HAL_STORE below therefore access the words that ISRs share
+ * with lower levels without a lock. Reading, changing and writing back is atomic on no CPU: it takes a lock.
+ * ISRs of level device use plain accesses, because no code that shares these words can interrupt
+ * them.
  */
 #ifndef HAL_CPU_H
 #define HAL_CPU_H

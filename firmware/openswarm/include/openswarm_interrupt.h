@@ -14,8 +14,8 @@
  *                  HAL_MINIMUM_STACK. Level 6 belongs to the camera's capture where that is linked.
  *
  * Checks: the compiler refuses levels and vectors that do not exist. The linker refuses a vector that already has a
- * function (of the kernel, a driver or another application interrupt), and calls that levels 5 and 6 must not make, also
- * through other functions and pointers (CALL_TARGETS states where a pointer leads).
+ * function (of the kernel, a driver or another application interrupt). It also refuses calls that levels 5 and 6 must
+ * not make, directly, through other functions, or through pointers (CALL_TARGETS states the targets of a pointer).
  */
 #ifndef OPENSWARM_INTERRUPT_H
 #define OPENSWARM_INTERRUPT_H

@@ -127,8 +127,8 @@ class AnnotationBindings:
     def _is_loop_line(self, code: FunctionGraph, loop: Loop, line: LineKey) -> bool:
         """Whether a line can be the line of a loop.
 
-        It can if all code of the function within the loop is on one side of the line, or if an exit of the loop is in
-        the line.  The line of an unrolled loop is part of the enclosing loop, to which its annotations do not apply.
+        All code of the function within the loop must be on one side of the line, or an exit of the loop must be in the
+        line.  The line of an unrolled loop is part of the enclosing loop, to which its annotations do not apply.
         """
         first, end = self.sources.function_extent(line)
         places = [self.sources.line_of(step.pc) for head in loop.members for step in code.blocks[head].steps]
