@@ -214,7 +214,7 @@ class ArenaEnv(ParallelEnv):  # type: ignore[misc]
 
     def __reduce__(self) -> tuple[Callable[..., ArenaEnv], tuple[Any, ...]]:
         """Pickle and copy as the inputs from which the episode can be repeated."""
-        return _repeated, (self.scene, self._settings, self._next_seed, self._has_begun, self._taken)
+        return _repeat_episode, (self.scene, self._settings, self._next_seed, self._has_begun, self._taken)
 
     @property
     def supervisor(self) -> Supervisor:
@@ -287,9 +287,9 @@ class ArenaEnv(ParallelEnv):  # type: ignore[misc]
         return found
 
 
-def _repeated(scene: Scene, settings: dict[str, Any], next_seed: int, has_begun: bool,
-              actions: list[dict[str, Vector]]) -> ArenaEnv:  # fmt: skip
-    """Return an environment whose episode has had these actions."""
+def _repeat_episode(scene: Scene, settings: dict[str, Any], next_seed: int, has_begun: bool,
+                    actions: list[dict[str, Vector]]) -> ArenaEnv:  # fmt: skip
+    """Return an environment whose episode has repeated these actions."""
     env = ArenaEnv(scene, **settings)
     env._next_seed = next_seed
     if has_begun:

@@ -164,7 +164,7 @@ def unpack(bundle: Path, folder: Path) -> list[Path]:
                 if len(parts) != 2 or ".." in parts or "\\" in name or name.startswith("/"):
                     raise RecordError(f"{bundle}: {name!r} is not a file of a run")
                 (folder / parts[0]).mkdir(parents=True, exist_ok=True)
-                if _extracted(archive, name, folder / parts[0] / parts[1]) != digest:
+                if _extract(archive, name, folder / parts[0] / parts[1]) != digest:
                     raise RecordError(f"{bundle}: {name} was modified (its hash differs)")
     except RecordError:
         raise
@@ -173,7 +173,7 @@ def unpack(bundle: Path, folder: Path) -> list[Path]:
     return sorted({folder / PurePosixPath(name).parts[0] for name in hashes})
 
 
-def _extracted(archive: zipfile.ZipFile, name: str, target: Path) -> str:
+def _extract(archive: zipfile.ZipFile, name: str, target: Path) -> str:
     """Write a member of an archive to a file, in pieces, and return its SHA-256."""
     digest = hashlib.sha256()
     with archive.open(name) as source, target.open("wb") as file:

@@ -65,7 +65,7 @@ def parser() -> Parser:
 def run(options: argparse.Namespace) -> int:
     """Run the command. Return the exit status as listed in DESCRIPTION."""
     if options.tui is not None:
-        return _prompted(options)
+        return _run_prompt(options)
     from emu.dap.wire import Wire, wire_over
 
     _refuse_options_of_the_prompt(options)
@@ -86,7 +86,7 @@ def run(options: argparse.Namespace) -> int:
                 return status
 
 
-def _prompted(options: argparse.Namespace) -> int:
+def _run_prompt(options: argparse.Namespace) -> int:
     import emu
     from emu.dap.server import Server
     from emu.prompt.reader import Prompt

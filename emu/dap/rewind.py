@@ -88,19 +88,19 @@ class RewindingSession(BreakpointRequests):
         """Rewind the environment too if it has checkpoints. Return the event to report."""
         history = self._debuggee.history
         follows = history.environment is not None and history.environment.has_checkpoints and history.is_past
-        return self._rewound(event) if follows else event
+        return self._rewind_to_machine(event) if follows else event
 
     def _rewind_environment(self) -> None:
         """Rewind the environment as `StateRequests` specifies."""
         history = self._debuggee.history
         if history.environment is None or not history.is_past:
             return
-        event = self._rewound(ALREADY_THERE)
+        event = self._rewind_to_machine(ALREADY_THERE)
         if event is not ALREADY_THERE:
             self._run_action(lambda: event)
             raise RequestRefusedError(f"interrupted while rewinding, at cycle {self._debuggee.machine.cycle:,}")
 
-    def _rewound(self, event: StopEvent) -> StopEvent:
+    def _rewind_to_machine(self, event: StopEvent) -> StopEvent:
         """Rewind the environment to the machine's cycle.
 
         Return `event`, or INTERRUPTED if the client paused the rewind.

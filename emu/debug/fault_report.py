@@ -116,7 +116,7 @@ def explain(machine: Machine, stop: Stop) -> Stop:
     """Return `stop` with reason "fault" and a `FaultReport` if the firmware failed, else the unchanged `stop`."""
     inspector = Inspector(machine)
     case = _case_of_stop(machine, inspector, stop)
-    return stop if case is None else replace(stop, reason="fault", fault=_diagnosed(machine, inspector, case))
+    return stop if case is None else replace(stop, reason="fault", fault=_diagnose(machine, inspector, case))
 
 
 def never_started(machine: Machine, stop: Stop, refused: int) -> Stop:
@@ -124,7 +124,7 @@ def never_started(machine: Machine, stop: Stop, refused: int) -> Stop:
     calls = "a call that needs" if refused == 1 else f"{refused:,} calls that need"
     cause = f"the kernel was never started (Sys_Start_Kernel) and refused {calls} it to run; ended"
     case = _Case(cause, stop.pc, stop.cycle, is_exact=True)
-    return replace(stop, reason="fault", fault=_diagnosed(machine, Inspector(machine), case))
+    return replace(stop, reason="fault", fault=_diagnose(machine, Inspector(machine), case))
 
 
 def is_thread_overflow(machine: Machine) -> bool:
@@ -143,13 +143,13 @@ def thread_overflow(machine: Machine, stop: Stop) -> Stop:
     """Return `stop` as the fault of an OpenSwarm thread that overflowed its stack in the last trap."""
     assert machine.checkpoints.trap is not None
     case = _case_of_trap(machine, machine.checkpoints.trap)
-    return replace(stop, reason="fault", fault=_diagnosed(machine, Inspector(machine), case))
+    return replace(stop, reason="fault", fault=_diagnose(machine, Inspector(machine), case))
 
 
 def state_report(machine: Machine, cause: str) -> FaultReport:
     """Return the thread, call stack and last branches of a machine without a fault, as a `FaultReport`."""
     case = _Case(cause, machine.pc, machine.cycle, None, machine.checkpoints.start)
-    return _diagnosed(machine, Inspector(machine), case)
+    return _diagnose(machine, Inspector(machine), case)
 
 
 # Classification of a stop
@@ -215,7 +215,7 @@ def _case_of_trap(machine: Machine, trap: tuple[Vector, bytes, bytes | None]) ->
 # Diagnosis
 
 
-def _diagnosed(machine: Machine, inspector: Inspector, case: _Case) -> FaultReport:
+def _diagnose(machine: Machine, inspector: Inspector, case: _Case) -> FaultReport:
     """Find the faulty instruction of `case`, replay the run up to it and describe the state there."""
     trace = _trace(machine, case)
     replay_cycle = _locate(machine, inspector, case, trace)

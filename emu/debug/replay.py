@@ -72,13 +72,13 @@ def retrace(machine: Machine, state: bytes, end: int, until: Callable[[], bool] 
             start = machine.cycle
             if machine.run_until(max(start, end - window)) is not None:
                 return None
-            found = _stepped(machine, end, until)
+            found = _single_step(machine, end, until)
         if found is None or len(found.branches) >= MAX_BRANCHES or end - window <= start:
             return found
     return found
 
 
-def _stepped(machine: Machine, end: int, until: Callable[[], bool] | None) -> ExecutionTrace | None:
+def _single_step(machine: Machine, end: int, until: Callable[[], bool] | None) -> ExecutionTrace | None:
     """Single-step the machine and return the trace, with the end conditions of `retrace`."""
     branches: deque[TakenBranch] = deque(maxlen=MAX_BRANCHES)
     stop: Stop | None = None

@@ -89,12 +89,12 @@ class Threads:
 
     def running(self) -> str:
         """Return the running or interrupted thread as text `thread 1 (worker)`; empty if there are no threads."""
-        pcb = self._dereferenced(RUNNING)
+        pcb = self._dereference(RUNNING)
         if pcb is None:
             return ""
         return str(self._thread(pcb, False))
 
-    def _dereferenced(self, name: str) -> Value | None:
+    def _dereference(self, name: str) -> Value | None:
         """Return the target of a pointer variable of the kernel, None for a null pointer."""
         variable = self._inspector.variable(name) if self._pcb is not None else None
         if variable is None:
@@ -106,7 +106,7 @@ class Threads:
         """Yield each thread's control block, and whether the thread is blocked, that is, not in the ready ring."""
         seen: set[int] = set()
         for name, blocked in ((RING, False), (BLOCKED, True)):
-            pcb = self._dereferenced(name)
+            pcb = self._dereference(name)
             while pcb is not None and pcb.address is not None and pcb.address not in seen and len(seen) < LIMIT:
                 seen.add(pcb.address)
                 yield pcb, blocked
@@ -115,7 +115,7 @@ class Threads:
 
     def _thread(self, pcb: Value, blocked: bool) -> Thread:
         pid = _number(pcb, "pid")
-        runs = self._dereferenced(RUNNING)
+        runs = self._dereference(RUNNING)
         is_running = runs is not None and runs.address == pcb.address
         is_zombie = _number(pcb, "block") == pcb.address  # the kernel has freed the stack of a zombie
         frames = () if is_zombie else tuple(self._frames(pcb, is_running))

@@ -36,7 +36,7 @@ class InstructionExecution:
 
     def _step(self, step: Instruction, state: AbstractState) -> Flow:
         if state.repeat is not None:
-            return self._repeated(step, state)
+            return self._execute_repeated(step, state)
         transfer = self.explorer.transfer
         level, top, start, blocked = state.ipl, state.w[15], state.time, state.disi_end
         state.time += step.cycles + (state.stall & step.pointers != 0)
@@ -71,7 +71,7 @@ class InstructionExecution:
             self._update_masking(state, step.pc)
         return flow
 
-    def _repeated(self, step: Instruction, state: AbstractState) -> Flow:
+    def _execute_repeated(self, step: Instruction, state: AbstractState) -> Flow:
         """Execute the target of REPEAT; PSV reads stall in its first and last iteration (isa.md §7.5, §13.3)."""
         transfer, count = self.explorer.transfer, state.repeat
         state.repeat = None

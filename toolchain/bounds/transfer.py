@@ -335,7 +335,7 @@ class TransferFunctions:
             low, high = extremes(ea)
             self._forget(low, high + size - 1)
             if low < SFR_END:
-                self._overwritten(low, min(high + size, SFR_END) - 1, value if size == 2 else WORD)
+                self._store_to_unknown_register(low, min(high + size, SFR_END) - 1, value if size == 2 else WORD)
             return
         self.unknown_store = True
         if state.lowest_leak < NO_ADDRESS:
@@ -418,7 +418,7 @@ class TransferFunctions:
             if all(on & ~level or off & level for level in (0, annotated)):
                 self.priority_change = f"{name}: {on}" if on | off == 7 else name
 
-    def _overwritten(self, low: int, high: int, value: Value) -> None:
+    def _store_to_unknown_register(self, low: int, high: int, value: Value) -> None:
         """Store `value` to an unknown register within low..high of the SFR space."""
         self.overwrote_registers = True
         state = self.state

@@ -275,12 +275,12 @@ class Evaluator(Effects):
             value = self.unknown("read", 8 * size)
             path.record_event(Event("read", address, size, value, aligned=_is_even(i)))
             return self.cast("trunc", (value, None), i.type)
-        return self._loaded(path, address, i.type)
+        return self._load_at(path, address, i.type)
 
-    def _loaded(self, path: Path, address: Term, t: Type) -> Any:
+    def _load_at(self, path: Path, address: Term, t: Type) -> Any:
         if t.kind == "struct":
             offsets = struct_offsets(t)
-            return [self._loaded(path, address + o, e) for o, e in zip(offsets, t.elems, strict=False)]
+            return [self._load_at(path, address + o, e) for o, e in zip(offsets, t.elems, strict=False)]
         if t.kind not in ("int", "ptr", "float"):
             raise Undecided(f"a value of type {t}")
         return self.cast("trunc", (path.memory.read(address, store_size(t)), None), t)
@@ -293,12 +293,12 @@ class Evaluator(Effects):
             term = self.cast("zext", (self.sure(path, i.args[0]), None), Type("int", 8 * store_size(t)))[0]
             path.record_event(Event("write", address, term.size() // 8, term, aligned=_is_even(i)))
             return
-        self._stored(path, address, t, value)
+        self._store_at(path, address, t, value)
 
-    def _stored(self, path: Path, address: Term, t: Type, value: Any) -> None:
+    def _store_at(self, path: Path, address: Term, t: Type, value: Any) -> None:
         if t.kind == "struct":
             for o, e, part in zip(struct_offsets(t), t.elems, value, strict=False):
-                self._stored(path, address + o, e, part)
+                self._store_at(path, address + o, e, part)
             return
         term, poison = value
         if poison is not None:
