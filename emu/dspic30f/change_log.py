@@ -160,6 +160,11 @@ class ChangeLog:
             return
         self._consumer(self._entries[:count])
 
+    def after_native_run(self) -> None:
+        """Log what a native boundary has changed before an address without native code, then deliver all entries."""
+        self._look(BOUNDARY)
+        self.after_run()
+
     def _after_instruction(self, execute: Callable[[], None]) -> Callable[[], None]:
         state = self._core.state
 

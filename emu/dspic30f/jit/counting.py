@@ -152,7 +152,7 @@ class ChangeCounting:
         self.start = log.start
         self.stop = log.stop
         self.before_run = log.before_run
-        self.after_run = log.after_run
+        self.after_run = log.after_native_run
 
     def counter(self) -> CycleCounter:
         """Return a counter for one translated function."""

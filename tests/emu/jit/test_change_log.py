@@ -120,9 +120,16 @@ def slices(machine: Machine, until: int, cycles: int) -> None:
         pass
 
 
-@pytest.mark.parametrize(("engine", "cycles"), [("plain", CYCLES), ("jit", CYCLES), ("jit", 501)])
-def test_changes_by_stores_interrupts_and_sleep(path: Path, engine: str, cycles: int) -> None:
+@pytest.mark.parametrize(("engine", "cycles", "threshold"), [
+    ("plain", CYCLES, 1), ("jit", CYCLES, 1), ("jit", 501, 1), ("jit", CYCLES, 9),
+])  # fmt: skip
+def test_changes_by_stores_interrupts_and_sleep(path: Path, engine: str, cycles: int, threshold: int) -> None:
+    """With a threshold of 9, native boundaries enter handlers that have no native code yet, also behind a hook."""
     stepping, machine = machine_of(path, "plain"), machine_of(path, engine)
+    if isinstance(machine.runner, JitEngine):
+        machine.runner.threshold = threshold
+    if threshold > 1:
+        machine.hook_pc("deep", lambda: None)
     for one in (stepping, machine):
         one.run(until="main")
     watched = watched_by(machine)
