@@ -1,6 +1,6 @@
 """Messages of 25 emulated Kilobots beside those of 25 real ones: sent, and received by distance (kilobot.md §5).
 
-    python bench/kilobot_messages.py [--image FILE.elf] [--seeds 3] [--seconds 161] [--json]
+    python bench/kilobot_messages.py [--image FILE.elf] [--seeds 1] [--seconds 161] [--json]
 
 Robots on a grid of 50 mm send as often as they may for 4,800 ticks (firmware/kilobot/programs/counts.c). An image of
 that program with another library may be named. Two things are fitted: the share of lost pulses by distance, and the
@@ -71,7 +71,7 @@ def built(out: Path) -> AvrImage:
 def main() -> None:
     options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     options.add_argument("--image", help="ELF file of the program (default: built with firmware/kilobot)")
-    options.add_argument("--seeds", type=int, default=3)
+    options.add_argument("--seeds", type=int, default=1, help="number of seeds (default 1)")
     options.add_argument("--seconds", type=float, default=161.0, help="simulated time after RUN; 4,800 ticks: 158")
     options.add_argument("--json", action="store_true", help="print one JSON object")
     given = options.parse_args()

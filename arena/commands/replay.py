@@ -68,6 +68,8 @@ def run(options: argparse.Namespace) -> int:
         return 0
     if not is_standard(options.trial) and not options.trial.is_file():
         raise RecordError(f"{options.trial}: no such file; expected a trial-NNNN.parquet")
+    if options.out is not None and options.out.suffix.lower() in (".gif", ".mp4"):
+        raise ValueError(f"--out {options.out}: writes an HTML page; --export {options.out} writes a video")
     trial = read_trial(options.trial)
     load_trusted([trial], options)
     beside = options.trial if is_standard(options.trial) else options.trial.with_suffix(".html")

@@ -29,6 +29,8 @@ FRAMES_PER_S: Final = 12.5
 """Frame rate of the video; a frame lasts 8 of the hundredths of a second in which GIF counts."""
 LIMIT: Final = 20_000
 """Most frames of a video; more frames are probably a mistake in --speed."""
+MAX_NUMBERED: Final = 50
+"""Most robots whose numbers a frame shows; those of a larger crowd overlap."""
 _LINE: Final = 14
 _PIXEL: Final = 6
 _INK, _PAPER, _PALE = palette.rgb(palette.INK), palette.rgb(palette.PAPER), (221, 221, 221)
@@ -112,7 +114,8 @@ def arena_picture(
         disc(x, y, body.radius_cm, _led_colour(leds[number] if leds else 0) if is_kilobot else _SEEN[answer])
         tip = (x + ahead * math.cos(heading)) * scale, height - (y + ahead * math.sin(heading)) * scale
         draw.line((x * scale, height - y * scale, *tip), fill=_INK, width=2)
-        draw.text((x * scale + 8, height - y * scale - 14), str(number), fill=_INK)
+        if len(robots) <= MAX_NUMBERED:
+            draw.text((x * scale + 8, height - y * scale - 14), str(number), fill=_INK)
     return image
 
 

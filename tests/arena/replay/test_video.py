@@ -116,6 +116,7 @@ class _NothingInstalled:
     ("arguments", "message"),
     [
         (["--export", "film.avi"], "expected a name that ends in .gif or .mp4"),
+        (["--out", "film.gif"], "--out film.gif: writes an HTML page; --export film.gif writes a video"),
         (["--export", "film.gif", "--speed", "0"], "expected a positive number of at most 1e7"),
         (["--export", "film.gif", "--speed", "1e-4"], "the limit is 20000"),
         (["--export", "nowhere/film.gif"], "cannot be written"),
