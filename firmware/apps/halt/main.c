@@ -1,5 +1,5 @@
 /* Simultaneous stop (README.md): one robot decides when all stop. A message contains the time that is left at the
- * moment of its transmission, so all stop together, whichever message told a robot of it. */
+ * moment of its transmission, so all robots stop together, no matter from which robot the message came. */
 #include "rove.h"
 
 #include <openswarm.h>
