@@ -32,7 +32,7 @@ struct ring {
     uint16_t past_ambient[SENSORS], past_reflection[SENSORS];
     f64 (*outside)(const struct light *, i64 sensor, i64 cycle); // counts to subtract; null: none
     const struct light *light;
-    i64 (*emit)(struct emission *, i64 line, i64 lit, i64 cycle); // host code called at each edge; 0: Python handles the next one
+    i64 (*emit)(struct emission *, i64 line, i64 lit, i64 cycle); // host code for each edge; 0: the next is for Python
     struct emission *emission;
     f64 near[POINTS], counts[POINTS], slope[POINTS];
 };
