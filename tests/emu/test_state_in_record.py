@@ -43,7 +43,7 @@ OUTSIDE = {
     "Timer._on_match": DERIVED, "Timer._on_change": DERIVED,
     "Camera._has_native_source": HOST, "Camera._pixels": HOST, "Camera._still": HOST, "Infrared._is_ready": HOST,
     "Infrared._prepare": HOST, "Infrared._tau_seconds": HOST, "Stimulus._steps": HOST,
-    "Can._r": WIRING, "Pins._ring_watchers": WIRING, "RuleInterpreter._views": WIRING,
+    "Can._r": WIRING, "Pins._ring_watchers": WIRING, "Pins._handlers": WIRING, "RuleInterpreter._views": WIRING,
     "Adc._settings_cache": CACHE, "Bus._noted": OBSERVER, "Bus._reported": OBSERVER,
     "Pins._edges": OBSERVER, "Pins._eager_before_log": OBSERVER, "Pins.frames": OBSERVER, "Uart._matcher": OBSERVER,
     "Uart._listeners": OBSERVER, "Stepper._on_step": OBSERVER, "Stepper._history": OBSERVER,
