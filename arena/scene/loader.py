@@ -353,7 +353,10 @@ def _table(
         if want is float and value is None:  # a record's JSON has no nan
             value = math.nan
         if want is float and type(value) is int:
-            value = float(value)
+            try:
+                value = float(value)
+            except OverflowError:
+                raise errors.at(name, key, f"{name}.{key}: the number is too large", number) from None
         if want is tuple:
             wrong = wrong_points(value)
             if wrong:

@@ -35,6 +35,8 @@ from emu.host.files import read_file
 from emu.inject.faults import KINDS
 
 UARTS: Final = ("uart1", "uart2")
+LONGEST_SECONDS: Final = 3600
+"""Maximum simulated time of a trial."""
 _KEYS: Final[dict[str, tuple[str, ...]]] = {
     "": ("seed", "trials", "run", "input", "detect", "faults"),
     "run": ("seconds", "start", "selector", "hang"),
@@ -119,8 +121,8 @@ def read(path: Path) -> Campaign:
     faults = {kind: reader.number("faults", kind, int, 0, 0, 1_000_000) for kind in KINDS}
     if not any(faults.values()):
         raise reader.fail("", "faults", "expected a share above 0 for a kind of fault")
-    seconds = reader.number("run", "seconds", float, None, 0.001, 3600)
-    start = reader.number("run", "start", float, 0.0, 0, 3600)
+    seconds = reader.number("run", "seconds", float, None, 0.001, LONGEST_SECONDS)
+    start = reader.number("run", "start", float, 0.0, 0, LONGEST_SECONDS)
     if start >= seconds:
         raise reader.fail("run", "start", f"start: expected a time before {seconds:g} s, not {start:g}")
     return Campaign(
@@ -142,10 +144,10 @@ def _timed_input(reader: _Reader, key: str) -> tuple[tuple[float, bytes], ...]:
     found: list[tuple[float, bytes]] = []
     for one in _list_value(reader, "input", key):
         is_pair = isinstance(one, list) and len(one) == 2
-        if not is_pair or not isinstance(one[0], int | float) or not isinstance(one[1], str) or one[0] < 0:
+        if not is_pair or not isinstance(one[0], int | float) or not isinstance(one[1], str):
             raise reader.fail("input", key, expected)
-        if found and one[0] < found[-1][0]:
-            raise reader.fail("input", key, expected)
+        if not (found[-1][0] if found else 0) <= one[0] <= LONGEST_SECONDS:
+            raise reader.fail("input", key, f"{expected}, from 0 to {LONGEST_SECONDS} s")
         try:
             found.append((float(one[0]), one[1].encode("latin-1")))
         except UnicodeEncodeError:
