@@ -50,8 +50,8 @@ _loaded: Final[dict[str, Experiment]] = {}
 class Curve:
     """Definition of a metric over time.
 
-    `scale` converts a value to `unit`. `best` is the largest possible value. `reference` is a published value and its
-    source, which figures show as a line."""
+    `scale` converts a value to `unit`. `best` is the largest possible value. `reference` is a published value, before
+    `scale`, and its source; figures show it as a line."""
 
     name: str
     label: str

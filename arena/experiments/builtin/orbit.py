@@ -13,7 +13,7 @@ BEGIN_S = 10.0
 """Time of the trial from which the distance counts. Before, the planet receives RUN and turns into its orbit."""
 
 CURVES = [
-    Curve("distance", "distance of the planet", "mm", 10, reference=(60.0, "60 mm (Kilobotics, lab 4)")),
+    Curve("distance", "distance of the planet", "mm", 10, reference=(6.0, "60 mm (Kilobotics, lab 4)")),
     Curve("rounds", "rounds around the star", "", reference=(5.0, "5 rounds (Rubenstein et al. 2012)")),
 ]
 

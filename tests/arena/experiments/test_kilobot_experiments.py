@@ -61,6 +61,9 @@ def test_rounds_and_distances_of_movers() -> None:
     orbit = experiment_of("orbit").all_curves(samples("orbit", [[(0.0, 0.0), at] for at in circle]))
     assert orbit["rounds"][-1] == pytest.approx(0.25)
     assert orbit["distance"] == pytest.approx(np.full(31, 10.0))
+    distance = experiment_of("orbit").curves[0]
+    assert distance.reference is not None
+    assert distance.shown(distance.reference[0]).startswith("60"), distance.reference[1]
     edge = experiment_of("edge").all_curves(samples("edge", [[(-2.0, 0.0), (2.0, 0.0), at] for at in circle]))
     assert edge["distance"][0] == pytest.approx(8.0)
     assert edge["rounds"][-1] == pytest.approx(0.25)
