@@ -152,7 +152,9 @@ class CallExecution(InstructionExecution):
             self._update_masking(end, last.pc)
             if tail:
                 self._record_return(end)
-            elif len(ends) > 1 and self._tests_result(last.after):
+                continue
+            self._record_stack_depth(end)  # at the CPU priority after the call, which may be lower than before
+            if len(ends) > 1 and self._tests_result(last.after):
                 self._block(self.code.blocks[last.after], end)
             else:
                 self._arrive(last.after, end)

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 
 import pytest
 
+from tests.toolchain.c_programs import build
 from toolchain.bounds.annotations.file import FileAnnotations, read_annotation_file
 from toolchain.bounds.program import Program
 from toolchain.bounds.report import Bound, BoundAnalysis
 from toolchain.cli import main
+from toolchain.elf.read import read_executable
 from toolchain.elf.write import executable_bytes
 from toolchain.errors import ToolError
 
@@ -230,3 +233,24 @@ def test_annotations_for_unknown_functions_are_refused(image, file):
     """An annotation for an unknown function is refused: a misspelt name is an error."""
     with pytest.raises(ToolError, match="no function is called missing"):
         Program(image(".global __reset\n__reset: call w0\n return\n").linked.image, file=FileAnnotations(**file))
+
+
+HAND_OVER = """
+#include <bounds.h>
+COMES_BACK(hand_over, 0);
+int other;
+extern void deep(void);
+int main(void) { deep(); return other; }
+"""
+
+
+def test_the_stack_behind_a_call_counts_at_the_priority_of_its_return(tmp_path: Path) -> None:
+    """A caller of priority 1 is continued at priority 0, where every interrupt adds its stack to the caller's frame."""
+    deep = func("_deep", "bset SR, #5", "lnk #20", "rcall _hand_over", "ulnk", "return")
+    (tmp_path / "a.c").write_text(HAND_OVER)
+    (tmp_path / "b.s").write_text(" .text" + deep + func("_hand_over", "mov _other, w15", "return"))
+    built = build([tmp_path / "a.c", tmp_path / "b.s"], tmp_path / "a.elf", "-Os", "-g", "-fno-lto")
+    assert built.status == 0, built.messages
+    program = Program(read_executable((tmp_path / "a.elf").read_bytes(), "a.elf"))
+    bound = BoundAnalysis(program).bound("_main", program.calls.named("main"), "call")
+    assert bound.stack == {0: 4 + 2 + 20, 1: 4 + 2 + 20 + 4}
