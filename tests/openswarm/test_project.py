@@ -28,7 +28,7 @@ def run_command(folder: Path, *words: str, **environment: str) -> subprocess.Com
 
 
 def new(folder: Path, *words: str, baselines: dict[str, bytes] | None = None) -> Path:
-    """Return a new project; with baselines it is `shortened`, as the project is whose baselines they are."""
+    """Return a new project; with baselines it is `shortened`, because they are those of a shortened project."""
     assert main(["new", str(folder), *words, *["--no-baselines"] * (baselines is not None)]) == 0
     if baselines is not None:
         shortened(folder)
