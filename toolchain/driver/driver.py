@@ -121,6 +121,9 @@ def front_end(options: CcOptions, scratch: Path) -> dict[Input, bytes]:
     from toolchain.frontend.clang import ir_job
 
     sources = [item for item in options.inputs if item.language in IR_SOURCES]
+    for item in sources:
+        if item.path.is_fifo():
+            raise ToolError(f"{item.path}: is a pipe; expected a file, because a source is read several times")
     jobs = {item: ir_job(options, item, scratch / f"{number}.front.ll") for number, item in enumerate(sources)}
     compiled = _compile(options, jobs)
     modules: dict[Input, bytes] = {}

@@ -121,6 +121,16 @@ def test_a_source_whose_name_is_no_text_is_compiled(
     assert cc(capsys, *flags, source, "-o", tmp_path / "out.elf") == (0, "")
 
 
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="pipes of POSIX")
+def test_a_pipe_is_no_source(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    """The first reader of a pipe takes its content, so that the next would compile an empty text."""
+    os.mkfifo(tmp_path / "main.c")
+    status, said = cc(capsys, "-c", tmp_path / "main.c", "-o", tmp_path / "out.o")
+    assert (status, said.count("\n")) == (2, 1)
+    assert "main.c: is a pipe; expected a file" in said
+    assert not (tmp_path / "out.o").exists()
+
+
 def test_diagnostics_carry_the_users_file_and_line(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     """All diagnostics of clang are printed with the user's file and line; warnings do not fail the run."""
     source = write(tmp_path, "warn.c", "int main(void)\n{\n    int unused = 3;\n    return 0;\n}\n")
