@@ -62,6 +62,8 @@ class _Stack:
     end: int
     interrupted: int | None = None
     """W15 at the interrupt that is in progress on the stack, None without one."""
+    has_limit: bool = False
+    """Whether SPLIM is the end of the stack while it is used; a new thread may use the memory of an ended one."""
 
 
 @dataclass
@@ -196,7 +198,7 @@ class Observer:
         """Begin the stack of a thread at its first instruction; it replaces those that used the memory before."""
         start, end = self.machine.w[15] - RETURN_ADDRESS, self.machine.peek("SPLIM") + 2
         self.stacks = [one for one in self.stacks if one.end <= start or one.start >= end]
-        self.stacks.append(_Stack(name, start, end))
+        self.stacks.append(_Stack(name, start, end, has_limit=name != "main"))
 
     def _record(self) -> None:
         top = self.machine.w[15]
@@ -218,7 +220,10 @@ class Observer:
         return self.machine.peek("SR") >> PRIORITY & 7
 
     def _stack_of(self, top: int) -> _Stack | None:
-        return next((stack for stack in self.stacks if stack.start <= top <= stack.end), None)
+        stack = next((stack for stack in self.stacks if stack.start <= top <= stack.end), None)
+        if stack is not None and stack.has_limit and stack.end != self.machine.peek("SPLIM") + 2:
+            return None
+        return stack
 
     def _enter(self, top: int) -> None:
         self._open = [(name, at, start, False) for name, at, start, _ in self._open]
