@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -35,7 +36,11 @@ def test_a_kilobot_in_the_studio(tmp_path: Path) -> None:
         assert studio.ask("digest") != digest
         do(studio, "rewind", 40)
         assert studio.ask("digest") == digest
-        for words, *command in (("no Bluetooth", "send", 0, "x"), ("e-pucks only", "debug", 0),
-                                ("e-pucks only", "toggle_breakpoint", 1, "main")):  # fmt: skip
+        refused: list[tuple[str, str, tuple[Any, ...]]] = [
+            ("no Bluetooth", "send", (0, "x")),
+            ("e-pucks only", "debug", (0,)),
+            ("e-pucks only", "toggle_breakpoint", (1, "main")),
+        ]
+        for words, name, arguments in refused:
             with pytest.raises(CommandRefusedError, match=f"robot [01] is a kilobot: .*{words}"):
-                studio.ask(*command)
+                studio.ask(name, *arguments)
