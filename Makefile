@@ -28,7 +28,7 @@ LINTED := $(TYPED) firmware tests bench docs setup.py
 PIP    := $(PY) -m pip install --quiet --disable-pip-version-check --no-compile
 
 firmware.elf: $(STAMP) FORCE
-	$(MAKE) -C firmware APP=$(APP) PYTHON=$(abspath $(PY))
+	$(MAKE) -s -C firmware APP=$(APP) PYTHON=$(abspath $(PY))
 	cp firmware/build/$(APP)/firmware.elf $@.part && mv $@.part $@
 
 run: firmware.elf

@@ -62,7 +62,7 @@ def add_plan(command: argparse.ArgumentParser) -> None:
         "--start",
         type=Path,
         metavar="RECORD",
-        help="begin where the robots and objects of a recorded trial ended (trial-NNNN.parquet); firmware starts anew",
+        help="begin where the robots and objects of a recorded trial ended (trial-NNNN.parquet); firmware restarts",
     )
     command.add_argument(
         "--cache", type=use_cache, metavar="DIR", help="folder of the cache for firmware and native code"
