@@ -135,7 +135,8 @@ def _identify(reader: _Reader) -> tuple[int, ...]:
     ident, kind, machine = fields[:3]
     if machine != EM_DSPIC30F:
         known = _MACHINES.get(machine, "an unknown machine")
-        raise reader.fail(f"is built for {known} (e_machine {machine}), expected dsPIC30F ({EM_DSPIC30F})")
+        cure = "; `emu run --board kilobot` runs images for the Kilobot's AVR" if known == "AVR" else ""
+        raise reader.fail(f"is built for {known} (e_machine {machine}), expected dsPIC30F ({EM_DSPIC30F}){cure}")
     if ident[4] != 1 or ident[5] != 1:
         raise reader.fail(f"has ELF class {ident[4]}, data encoding {ident[5]}; expected 1 (32 bit), 1 (little endian)")
     if kind == ET_REL:

@@ -114,6 +114,7 @@ def test_ram_data_without_noload_is_a_warning_and_not_loaded():
     ("change", "expected"),
     [
         ({"machine": 105}, "is built for MSP430 (e_machine 105), expected dsPIC30F (118)"),
+        ({"machine": 83}, "AVR (e_machine 83), expected dsPIC30F (118); `emu run --board kilobot` runs images"),
         ({"machine": 4711}, "is built for an unknown machine (e_machine 4711)"),
         ({"type": 1}, "is an object file; link it into an executable first"),
         ({"type": 3}, "has ELF type 3, expected 2"),
