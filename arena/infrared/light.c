@@ -1,6 +1,6 @@
 // Light of other robots' emitters at an infrared sensor, for emu/boards/epuck/ring.c. channel.py has the histories of
-// the emitters, propagation.py their strength at the sensors, ring.py loss, ripple and noise. And the update of all
-// sensors at the start of a quantum.
+// the emitters, propagation.py their strength at the sensors, ring.py loss, ripple and noise. This file also
+// updates all sensors of a robot at the start of a quantum.
 //
 // One thread appends to a history while others read older changes of it. So a change is complete before it counts.
 

@@ -75,7 +75,7 @@ i64 edge(uint8_t *record, const struct ring *r, i64 port, i64 changed, i64 level
             continue;
         i64 lit = (levels & r->pin[line]) != 0;
         edges[(*count)++] = (u64)(cycle << 8 | line << 1 | lit);
-        is_full |= *count > MANY || !r->emit(r->emission, line, lit, cycle);
+        is_full |= !r->emit(r->emission, line, lit, cycle) || *count > MANY;
     }
     for (i64 line = 0; is_full && line < LINES; line++)
         *(u64 *)(record + r->native[line]) &= ~(u64)r->pin[line];
