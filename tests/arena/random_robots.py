@@ -152,7 +152,7 @@ def _scans(chance: Chance, _n: int) -> str:
         both.format(0x180, "xor     LATF"), both.format(3, "mov     #LATG, w8\n        xor     w0, [w8], [w8]"),
     )  # fmt: skip
     toggles = "".join(
-        f"\n        {way}\n        repeat  #{chance.randrange(1 << chance.randrange(1, 14))}\n        nop"
+        f"\n        {way}\n        repeat  #{chance.randrange(1 << chance.randrange(1, 11))}\n        nop"
         for way in chance.choices(ways, k=chance.randrange(1, 9))
     )
     read = "\n        mov     ADCBUF0, w0\n        xor     w0, w2, w2"
@@ -237,14 +237,14 @@ def _ends(chance: Chance, _n: int) -> str:
         )
     )
     return (
-        f"\n        mov     _turns, w0\n        mov     #{chance.randrange(4, 200)}, w1\n        cp      w0, w1"
+        f"\n        mov     _turns, w0\n        mov     #{chance.randrange(1, 16)}, w1\n        cp      w0, w1"
         f"\n        bra     nz, 7f\n        {what}\n7:      nop"
     )
 
 
 PIECES: Final = ((_looks, 8), (_awaits_line, 1), (_waits, 3), (_idles, 2), (_sleeps, 0.3), (_turns, 4), (_blinks, 2),
-                 (_talks, 2), (_hears, 2), (_senses, 1), (_scans, 3), (_sets_camera, 0.5), (_guards, 2), (_traps, 0.6),
-                 (_asks, 1), (_ends, 0.7))  # fmt: skip
+                 (_talks, 2), (_hears, 2), (_senses, 1), (_scans, 1.5), (_sets_camera, 0.5), (_guards, 2),
+                 (_traps, 0.6), (_asks, 1), (_ends, 1.5))  # fmt: skip
 
 
 FAST: Final = {"PO3030K": ((0x4E, 0x0C), (0x1D, 0x00), (0x20, 0x33))}

@@ -136,10 +136,10 @@ def plan_from(options: argparse.Namespace, trials: int) -> Plan:
     own_images = list(kinds)
     images = tuple((one, image_for(one, home, kind)) for one, kind in kinds.items())
     bare = {group.kind for group in scene.groups if not group.image}
-    if len(bare) > 1 and options.brain is not None:
+    if len(bare) > 1 and options.brain not in (None, SCRIPTED):
         raise SceneError(f"{scene.name}: --brain {options.brain} cannot run on robots of two kinds; name an `image` in "
                          "the [[robots]] tables of one kind")  # fmt: skip
-    if KILOBOT.name in bare and options.brain is None:
+    if KILOBOT.name in bare and (options.brain is None or len(bare) > 1):
         raise SceneError(f"{scene.name}: robots.image: a Kilobot runs the image of a firmware; none is named")
     if scene.groups and all(group.image for group in scene.groups):
         brain, image = "+".join(dict.fromkeys(Path(one).stem for one in own_images)), None

@@ -19,7 +19,7 @@ def test_random_swarms_are_equal_in_all_modes(tmp_path: Path) -> None:
     """Single quanta, lock-step in Python and native lock-step give equal results. Three trials reach nearly all
     counters of the campaign."""
     tally = Counter[str]()
-    for seed in (5, 104, 105):
+    for seed in (9, 14, 26):
         assert check(Trial(seed, tmp_path), tally) is None
     missing = [what for what in EXPECTED if not tally[what]]
     assert set(missing) <= {"robots away", "turns of other threads", "robots that measure light"}
