@@ -1,7 +1,8 @@
 """Interference between entries: response times of interrupts, and stacks under nested interrupts.
 
 In: the bound of each entry in isolation (report.py).  Out: response times and stack depths.  Both assume that an
-interrupt is not requested again before its handler has returned.
+interrupt is not requested again before its handler has returned, and that a handler clears its flag before it lowers
+its own priority.
 """
 
 from __future__ import annotations
@@ -33,7 +34,7 @@ SECOND_STACK = "kernel stack"
 class Response:
     """Response of an interrupt: cycles from the request to its handler's first instruction.
 
-    Every other interrupt, and every trap whose handler returns, occurs once in this time.
+    Every other interrupt, and every trap whose handler returns, is requested once in this time.
     """
 
     name: str
@@ -123,7 +124,7 @@ def _response(report: BoundsReport, one: Bound) -> Response:
     """Return the response time of an interrupt: the sum of the delays that other entries cause.
 
     - the longest time for which code of a lower level masks the interrupt
-    - one run of every interrupt of the same or a higher level, and of every trap that returns
+    - the runs of every interrupt of the same or a higher level for one request, and one of every trap that returns
     - DISI that continues after the end of a handler
 
     Without nesting (NSTDIS), a handler of a lower level masks the interrupt as long as it runs.
@@ -132,13 +133,14 @@ def _response(report: BoundsReport, one: Bound) -> Response:
     longest, where, more = 0, "", one.disi_after_return
     known = not report.contradictions and not any(row.clock_stopped_at for row in report.rows)
     unnested = any(row.nesting_disabled_at for row in report.rows)
+    runs = _runs(report.interrupts)
     latency = max(LATENCY, ENTRY + max(row.longest_instruction for row in report.rows))
     for other in report.rows:
         if other is one or (other.level >= TRAP_LEVEL and not other.returns):
             continue
         if other.level >= level:
             known &= other.cycles is not None
-            more += (other.cycles or 0) + other.disi_after_return + latency
+            more += runs.get(other.name, 1) * ((other.cycles or 0) + other.disi_after_return + latency)
             continue
         masked, place = other.masked.get(level, (0, ""))
         cycles = masked or 0
@@ -151,6 +153,20 @@ def _response(report: BoundsReport, one: Bound) -> Response:
             longest, where = cycles, f"{place} in {other.name}"
         known &= level not in other.masked_for_ever and other.only_waits_are_unbounded
     return Response(one.name, level, longest if known else None, where, longest + more + latency if known else None)
+
+
+def _runs(interrupts: Iterable[Bound]) -> dict[str, int]:
+    """Return the most runs of each handler for one request of every interrupt.
+
+    A handler that is interrupted before it clears its flag runs again within each handler of a higher level that
+    lowers its priority below that of the first one.
+    """
+    runs: dict[str, int] = {}
+    falling = sorted((one for one in interrupts if one.level < TRAP_LEVEL), key=lambda one: -one.level)
+    for one in falling:
+        above = (other for other in falling if other.level > one.level and min(other.stack, default=0) < one.level)
+        runs[one.name] = 1 + sum(runs[other.name] for other in above)
+    return runs
 
 
 def _stacks(report: BoundsReport, analysis: BoundAnalysis) -> None:
@@ -173,27 +189,29 @@ def _stacks(report: BoundsReport, analysis: BoundAnalysis) -> None:
 
 
 def _on_top(interrupts: list[Bound], level: int) -> int:
-    """Return the greatest number of bytes used by nested interrupts above a level, each of which occurs at most once.
+    """Return the greatest number of bytes used by nested interrupts above a level, each of which is requested once.
 
     An interrupt nests in one of lower priority, or in one that has lowered its own priority.
     """
     able = [one for one in interrupts if one.level < TRAP_LEVEL and one.stack]
+    runs = _runs(able)
     if len(able) > MOST_ORDERS and any(at < one.level for one in able for at in one.stack):
-        return sum(RETURN_ADDRESS_BYTES + one.bytes for one in able)
-    found: dict[tuple[int, frozenset[int]], int] = {}
+        return sum(runs[one.name] * (RETURN_ADDRESS_BYTES + one.bytes) for one in able)
+    found: dict[tuple[int, tuple[int, ...]], int] = {}
 
-    def deepest(level: int, used: frozenset[int]) -> int:
-        key = level, used
+    def deepest(level: int, left: tuple[int, ...]) -> int:
+        """Return the bytes above `level`; each handler still has `left` runs."""
+        key = level, left
         if key not in found:
             found[key] = max(
                 (
-                    RETURN_ADDRESS_BYTES + depth + deepest(at, used | {number})
+                    RETURN_ADDRESS_BYTES + depth + deepest(at, (*left[:number], left[number] - 1, *left[number + 1 :]))
                     for number, one in enumerate(able)
-                    if number not in used and one.level > level
+                    if left[number] and one.level > level
                     for at, depth in one.stack.items()
                 ),
                 default=0,
             )
         return found[key]
 
-    return deepest(level, frozenset())
+    return deepest(level, tuple(runs[one.name] for one in able))
