@@ -169,6 +169,12 @@ class Infrared(BoardPart):
             mask = sum(pin for other, pin in self._lines if other == port)
             self.pins.handle_natively(port, mask, replaced, address_of(_code()["edge"]), self._ring_at)
 
+    def emit_in_python(self) -> None:
+        """Let Python handle all edges of the pulse lines again. The record then has no edges that wait."""
+        self._apply_edges()
+        for port in {port for port, _ in self._lines}:
+            self.pins.handle_natively(port, 0, (), 0, 0)
+
     def set_native_ready(self, is_ready: bool) -> None:
         """Set whether native code may compute levels without calling `prepare`; holds until the next call."""
         if is_ready == self._is_ready:

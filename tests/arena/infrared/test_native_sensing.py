@@ -23,7 +23,6 @@ from emu.boards.epuck.board import Epuck
 from emu.chips.dspic30f6014a import DSPIC30F6014A
 from emu.dspic30f.jit.engine import JitEngine
 from emu.machine.machine import Machine
-from tests.fuzz.swarm.fuzz_swarm import leave_edges_to_python
 
 QUANTA = 40
 SCANNER = """
@@ -114,7 +113,8 @@ def run(scene: Scene, image: Path, mode: str, monkeypatch: pytest.MonkeyPatch) -
         assert isinstance(robot.machine.runner, JitEngine)
         robot.machine.runner.wait = True
     if mode == "stepwise":
-        leave_edges_to_python(robots)
+        for robot in robots:
+            robot.machine.board.ir.emit_in_python()
     lockstep = LockStep(world, robots, channel, is_native=mode == "native", threads=2) if mode != "stepwise" else None
     seen: list[Any] = []
     for until in range(20, QUANTA + 1, 20):

@@ -15,7 +15,6 @@ import subprocess
 import sys
 import tempfile
 from collections import Counter
-from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any, Final
@@ -28,9 +27,7 @@ from arena.lockstep.scheduler import LockStep  # noqa: E402
 from arena.robots.firmware_controller import FirmwareController  # noqa: E402
 from arena.scene.loader import Scene, load_scene  # noqa: E402
 from arena.world.physics import World  # noqa: E402
-from emu.boards.epuck.analog import PULSE_PINS  # noqa: E402
 from emu.dspic30f.jit.engine import JitEngine  # noqa: E402
-from emu.peripherals.pins import parse_pin  # noqa: E402
 from tests.arena.random_robots import program  # noqa: E402
 from tests.fuzz.seeds import Campaign, parser  # noqa: E402
 
@@ -112,9 +109,9 @@ class Trial:
         scene, channel, world = self.scene, OpticalChannel.of(self.scene), World(self.scene, self.seed)
         several = enumerate(zip(self._images, self._selectors, strict=True))
         robots = [Robot(scene, self.seed, number, image, selector, channel) for number, (image, selector) in several]
-        if mode == STEPWISE:
-            leave_edges_to_python(robots)
         for robot in robots:
+            if mode == STEPWISE:
+                robot.machine.board.ir.emit_in_python()
             assert isinstance(robot.machine.runner, JitEngine)
             robot.machine.runner.wait = self._waits
         lockstep = None
@@ -147,13 +144,6 @@ class Trial:
         if lockstep is not None:
             tally["turns of other threads"] += lockstep.scheduler.worker_runs
         return seen
-
-
-def leave_edges_to_python(robots: Sequence[FirmwareController]) -> None:
-    """Let Python handle every edge of the infrared emitters, which native code would handle otherwise."""
-    for robot in robots:
-        for port in {parse_pin(pin)[0] for pin in PULSE_PINS}:
-            robot.machine.peripherals.pins.handle_natively(port, 0, (), 0, 0)
 
 
 def state_of(until: int, tally: Counter[str], robot: FirmwareController) -> list[Any]:
