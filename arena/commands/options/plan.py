@@ -20,7 +20,7 @@ from arena.robots.reactive import SPEED_TABLES
 from arena.scene.loader import Scene, SceneError, load_scene, scripted
 from arena.scene.robot_kind import EPUCK, KILOBOT
 from arena.scene.schema import RobotGroup
-from arena.trial.record import EXPERIMENT, read_trial, write_bytes
+from arena.trial.record import EXPERIMENT, RecordError, read_trial, write_bytes
 from emu.host.paths import use_cache
 
 DEFAULT_BRAIN, SCRIPTED, DEFAULT_CONTROLLER = "openswarm", "scripted", "A"
@@ -89,6 +89,8 @@ def start_at_end_of(scene: Scene, record: Path) -> Scene:
 
     Raises RecordError for an unusable record, SceneError if the scene has other numbers of robots or objects."""
     trial = read_trial(record)
+    if not len(trial.times):
+        raise RecordError(f"{record}: has no samples, so no poses to start from")
     turned = [trial.columns[f"r{robot}_heading"][-1] for robot in range(trial.scene.robots.count)]
     robots = [(x, y, math.degrees(heading)) for (x, y), heading in zip(trial.robots[-1].tolist(), turned, strict=True)]
     objects = [(*pose[:2], *map(math.degrees, pose[2:])) for pose in trial.object_poses[-1]]

@@ -24,6 +24,7 @@ from arena.world.poses import Poses
 from emu.boards.epuck.camera.scan import LINE_PIXELS
 from emu.dspic30f.jit.engine import JitEngine
 from tests.arena.images import BEGIN
+from tests.watchdog import HANG
 
 
 class Stepwise:
@@ -165,7 +166,7 @@ def test_threads_end_with_their_scheduler(clustering_image: Path) -> None:
     del lockstep, robots, robot
     gc.collect()
     for worker in workers:
-        worker.join(10)
+        worker.join(HANG)
         assert not worker.is_alive()
 
 

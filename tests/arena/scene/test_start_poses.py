@@ -6,6 +6,7 @@ import math
 from pathlib import Path
 
 import pytest
+from pyarrow import parquet
 
 from arena.campaign.bundle import pack, verify
 from arena.cli import main
@@ -60,6 +61,16 @@ def test_a_record_of_another_world_is_refused(
     assert run("clustering", tmp_path / "second", "--start", tmp_path / "first" / "trial-0001.parquet", *words) == 2
     assert expected in capsys.readouterr().err
     assert not list(tmp_path.glob("second/*.parquet"))
+
+
+def test_a_record_without_samples_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A record whose columns are empty ends with status 2 and one line that names the file."""
+    assert run("clustering", tmp_path / "first") == 0
+    record = tmp_path / "first" / "trial-0001.parquet"
+    parquet.write_table(parquet.read_table(record).slice(0, 0), record)
+    capsys.readouterr()
+    assert run("clustering", tmp_path / "second", "--start", record) == 2
+    assert capsys.readouterr().err == f"arena: {record}: has no samples, so no poses to start from\n"
 
 
 def test_listed_poses_may_touch_and_have_the_right_size() -> None:
