@@ -44,7 +44,7 @@ Advance = Callable[[int], Stop | None]
 @cache
 def _any_image() -> Image:
     """Return an image for the names in traces."""
-    return load_image(Path(__file__).parents[1] / "cli" / "hello.hex")
+    return load_image(Path(__file__).parents[2] / "cli" / "hello.hex")
 
 
 class Observed:
