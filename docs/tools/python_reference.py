@@ -22,7 +22,7 @@ MODULES: Final = (
     "arena.metrics",
     "arena.trial.record",
 )
-"""Public modules; tests/openswarm/test_api_examples.py runs their examples."""
+"""Public modules; tests/docs/test_api_examples.py runs their examples."""
 _OPTIONS: Final = "    options:\n      heading_level: 3\n      show_root_heading: false\n"
 
 

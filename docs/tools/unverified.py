@@ -4,7 +4,7 @@
     python docs/tools/unverified.py --write  # replaces the section in the page
 
 Input: comments and docstrings of the sources. Each sentence with the mark becomes a row, with the code beside which it
-stands. `tests/test_generated_parts.py` fails if a mark is missing on the page.
+stands. `tests/docs/test_generated_parts.py` fails if a mark is missing on the page.
 """
 
 from __future__ import annotations

@@ -5,7 +5,7 @@ Input is the firmware target/kills, whose victim thread runs scenes of such call
 with scene, boundary and pause, which reproduce it.
 
 After the kill no interrupt may write into the victim's memory. Then the keeper thread uses every bus, line and option,
-and the heap must be as before. tests/firmware/kernel/test_kills_on_target.py runs a sample,
+and the heap must be as before. tests/firmware/faults/test_kills_on_target.py runs a sample,
 tests/fuzz/kernel/fuzz_kills.py all.
 """
 

@@ -1,6 +1,6 @@
 """Threads killed inside driver calls: `python tests/fuzz/kernel/fuzz_kills.py [--rounds N] [--stride N]`.
 
-A sample of this campaign is tests/firmware/kernel/test_kills_on_target.py. A round executes a scene of driver calls,
+A sample of this campaign is tests/firmware/faults/test_kills_on_target.py. A round executes a scene of driver calls,
 without or with IPL slip (kernel.md §4), alternating by seed. It kills the thread at every instruction boundary of the
 scene, and then uses the devices again at once and after a while. With --stride a round tests every N-th boundary,
 from a first one that depends on its seed.

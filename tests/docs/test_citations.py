@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).resolve().parents[1]
+ROOT = Path(__file__).resolve().parents[2]
 FOLDERS = ("docs/reference", "docs/design", "docs")
 """Folders that are searched for a cited page, in this order."""
 SECTIONS = r"(?:§\s?[0-9]+(?:\.[0-9]+)*(?:(?:,| and|-| to)\s?(?=§))?\s?)+"

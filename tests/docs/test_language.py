@@ -12,7 +12,7 @@ import codespell_lib
 import pytest
 from markdown_it import MarkdownIt
 
-ROOT = Path(__file__).resolve().parents[1]
+ROOT = Path(__file__).resolve().parents[2]
 LONGEST = 40
 """Maximum number of words of a sentence, or of its part before a colon or semicolon."""
 AMERICAN = (
