@@ -33,7 +33,7 @@ def first_byte(engine: str, image: Path = IMAGE, cache: str | None = None) -> fl
         assert process.stdout is not None
         assert process.stdout.read(1)
         seconds = time.perf_counter() - start
-        process.stdout.read()
+        process.terminate()
     return seconds
 
 
