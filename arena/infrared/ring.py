@@ -88,7 +88,7 @@ class InfraredRing:
         self.is_read = False
         """Whether the firmware has ever converted one of the sensors."""
         self.poses_source: Callable[[], Poses] | None = None
-        """Source of the poses at the first conversion; later ones come by `begin_quantum`."""
+        """Source of the poses at the first conversion of a quantum, if native code may have begun the quantum."""
         self._optics: Optics | None = None
         rng = generator(seed, STREAM_INFRARED, robot)
         setting, code = scene.infrared, light_code()
@@ -145,7 +145,7 @@ class InfraredRing:
     def _on_conversion(self, cycle: int) -> None:
         """Update the sensors for a conversion that samples at a cycle, if none has in this quantum."""
         if self._sensing.is_stale:
-            if self.poses_source is not None and not self.is_read:
+            if self.poses_source is not None:
                 self._poses = self.poses_source()
             self._sense(cycle)
 

@@ -294,11 +294,12 @@ class FirmwareController:
         self._ring.begin_quantum(poses)
 
     def _begin_sensing(self) -> Poses:
-        """End the run at the current quantum, because the firmware reads its infrared sensors for the first time.
+        """Return the poses of the quantum in which the firmware reads its infrared sensors.
 
-        From the next quantum on, `run_until` takes the poses of each one.
+        At the first reading the run ends with this quantum. From the next one on, `run_until` takes the poses of each.
         """
-        self.control.end_at_cut()
+        if not self._ring.is_read:
+            self.control.end_at_cut()
         return self._current_poses()
 
     def _current_poses(self) -> Poses:

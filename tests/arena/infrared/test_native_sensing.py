@@ -76,6 +76,51 @@ __ADCInterrupt:
         retfie
 """
 
+SELDOM = """
+        .include "p30F6014A.inc"
+        .bss
+        .global _sum
+_sum:   .space  2
+        .text
+        .global _main
+_main:  mov     #0x00FF, w0
+        mov     w0, ADPCFG
+        mov     #0x1F3F, w0
+        mov     w0, ADCON3
+        mov     #0x80E0, w0             ; a conversion begins by software and ends by itself
+        mov     w0, ADCON1
+        mov     #0xFF00, w0
+        mov     w0, TRISD
+        bclr    TRISF, #7
+        bset    LATF, #7
+1:      mov     #8, w0                  ; sensors 0 and 4 in turn
+        btg     w5, #2
+        ior     w5, w0, w0
+        mov     w0, ADCHS
+        bset    ADCON1, #1
+2:      btss    ADCON1, #0
+        bra     2b
+        mov     ADCBUF0, w0
+        add     _sum
+        bclr    ADCON1, #0
+        mov     #6, w6                  ; 24 motor steps in 24 quanta until the next conversion
+3:      mov     #0x5A, w1
+        rcall   4f
+        mov     #0x69, w1
+        rcall   4f
+        mov     #0xA5, w1
+        rcall   4f
+        mov     #0x96, w1
+        rcall   4f
+        dec     w6, w6
+        bra     nz, 3b
+        bra     1b
+4:      mov     w1, LATD
+        repeat  #14700
+        nop
+        return
+"""
+
 
 def test_native_reflections_equal_those_of_python() -> None:
     """The C function `reflect` gives the counts of `reflection_at` for all distances and shares."""
@@ -155,4 +200,22 @@ def test_native_code_equals_python(
         assert seen == expected
     assert in_python["_switched"] > 100
     assert calls["_switched"] < 0.1 * in_python["_switched"]
+    assert calls["begin_quantum"] < 0.5 * in_python["begin_quantum"]
+
+
+def test_rare_conversions_read_the_present_surfaces(
+    assembled: Callable[[str], Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Robots that drive and read a sensor only every 24 quanta see what is near at that time. Between two readings
+    native code begins the quanta."""
+    scene = load_scene("clustering").with_values(
+        robots__count=2, objects__count=0, start__spread_tcy=1, start__robot_poses=[[5.0, 150, 17], [10.0, 150, 40]],
+    )  # fmt: skip
+    image = assembled(SELDOM)
+    expected, in_python = run(scene, image, "stepwise", monkeypatch)
+    for mode in ("Python", "native"):
+        seen, calls = run(scene, image, mode, monkeypatch)
+        assert [one[4].infrared for one in seen] == [one[4].infrared for one in expected]
+        assert seen == expected
+    assert expected[0][4].infrared != expected[-2][4].infrared
     assert calls["begin_quantum"] < 0.5 * in_python["begin_quantum"]
