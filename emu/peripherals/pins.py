@@ -213,16 +213,16 @@ class Pins:
     def handle_natively(self, port: int, mask: int, replaced: Container[Watcher], code: int, data: int) -> None:
         """Let native code call host code for edges on the pins in `mask` instead of their watchers `replaced`.
 
-        int64 code(record, data, port, changed, levels, cycle): as a watcher. A pin with any other watcher stays with
-        Python. No waveform of the port may depend on the pins. Host code may clear pins of `native_cell`;
-        `resume_native` sets them again.
+        int64 code(record, data, port, changed, levels, cycle) has the arguments of a watcher. Python still handles
+        pins that have any other watcher. No waveform of the port may depend on the pins. Host code may clear pins of
+        `native_cell`; `resume_native` sets them again.
         """
         self._handlers[port] = mask, replaced
         self._native[3 * port + 1], self._native[3 * port + 2] = code, data
         self.resume_native(port)
 
     def resume_native(self, port: int) -> None:
-        """Leave the edges of a port to host code again, as far as `handle_natively` allows it."""
+        """Let host code handle the edges of a port again, as far as `handle_natively` allows it."""
         mask, replaced = self._handlers[port]
         watched = (pins for pins, watcher in self._watchers[port] if watcher not in replaced)
         others = reduce(or_, watched, 0xFFFF if self._edges is not None else 0)

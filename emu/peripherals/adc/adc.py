@@ -167,9 +167,8 @@ class Adc(Peripheral):
             if len(self._settings_cache) >= _SETTINGS_CACHE_SIZE:
                 self._settings_cache.clear()
             settings = self._settings_cache[key] = self._decode_settings()
-        return (
-            settings if not self.con3["ADRC"] else self._decode_settings()
-        )  # such settings also depend on Fcy, which is not part of the key
+        # With the RC oscillator, settings also depend on Fcy, which is not part of the key.
+        return self._decode_settings() if self.con3["ADRC"] else settings
 
     def _decode_settings(self) -> ConversionSettings:
         tad = max(round(2 * _RC_TAD_SECONDS * self.context.fcy()), 1) if self.con3["ADRC"] else self.con3["ADCS"] + 1

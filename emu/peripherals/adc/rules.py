@@ -83,8 +83,8 @@ class AdcOperands:
 def write_con1(m: RuleBuilder, p: AdcOperands, value: Number, lanes: int) -> bool:
     """Write ADCON1 if only ADON changes.
 
-    On: sampling of the first channel starts in the next cycle. Off: a running conversion is lost. In both cases the
-    converter sets SAMP.
+    On: SAMP becomes 1, and sampling of the first channel starts in the next cycle. Off: SAMP becomes 0, and a running
+    conversion is lost.
     """
     old = m.get(p.register)
     free, kept = p.writable & lanes, p.clear_only & lanes

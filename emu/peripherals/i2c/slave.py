@@ -195,9 +195,8 @@ class ExternalMaster:
     def transfer(self, first: list[int], read_first: list[int] | None = None, count: int = 0) -> Transfer:
         """Start a transfer and return its result object.
 
-        It sends `first`. With `read_first`, it repeats the Start, sends `read_first` and reads `count` bytes. Then it
-        sends
-        Stop.
+        The master sends `first`. With `read_first`, it repeats the Start, sends `read_first` and reads `count` bytes.
+        Then it sends Stop.
         """
         self._transfer = result = Transfer()
         self._script.clear()

@@ -54,8 +54,10 @@ class Pwm(Peripheral):
         self._fault_port, self._fault_pin = parse_pin(site.fault_pin)
         self._zero: Final = self.cell("zero", "q")
         self._timestamps.append(self._zero)
-        """First cycle of the current period, also before power-on. While the time base is stopped, `_stopped_at` holds
-        PTMR."""
+        """First cycle of the current period, or the negative number that a written PTMR implies.
+
+        While the time base is stopped, `_stopped_at` holds PTMR instead.
+        """
         self._running: Final = self.cell("running", "B")
         self._stopped_at: Final = self.cell("stopped_at", "H")
         self._period: Final = self.cell("period", "H")
@@ -114,7 +116,7 @@ class Pwm(Peripheral):
         self._update(following)
 
     def _count_from(self, count: int, cycle: int) -> None:
-        """Let PTMR have a value, and count upwards, from `cycle` on.
+        """Make PTMR equal `count` in `cycle`, from which on it counts upwards.
 
         UNVERIFIED: a value above PTPER acts as PTPER, so that the period ends at the next count.
         """
@@ -132,7 +134,10 @@ class Pwm(Peripheral):
         self._update(self.now + 1)
 
     def _buffers_written(self) -> None:
-        """Handle a write to a buffered register: at once if the time base is off or IUE is set, else at the period."""
+        """Handle a write to a buffered register, which otherwise takes effect at the end of the period.
+
+        It takes effect immediately if the time base is off; with IUE set, only the duty cycles do.
+        """
         if not self._running.value:
             self._latch()
         elif self.updates["IUE"] and not self.updates["UDIS"]:
@@ -148,7 +153,7 @@ class Pwm(Peripheral):
         self._update(self.now + 1)
 
     def _due(self, due: int) -> None:
-        """Handle the end of a period or its middle, then edges, dead times and the special event."""
+        """Handle the special event, then the end or the middle of a period, then edges and ends of dead times."""
         mode, base = self.con["PTMOD"], self._base
         if self._special_cycle(base) == due:
             self._special_event(due)
@@ -161,7 +166,7 @@ class Pwm(Peripheral):
         self._update(due)
 
     def _end_period(self, mode: int, due: int) -> None:
-        """Load the buffers, restore outputs after a fault, and request the interrupt by the postscaler (§15.1)."""
+        """Load the buffers, leave a fault that is over, and request the interrupt if the postscaler is due (§15.1)."""
         self._latch()
         self._overridden.value = self.override.value
         self._end_fault()

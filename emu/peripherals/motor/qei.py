@@ -73,7 +73,7 @@ class Qei(Peripheral):
             self._take_levels()
 
     def _take_levels(self) -> None:
-        """Count the difference between the filtered levels and the present ones."""
+        """Take the present levels as the filtered ones; count the edge and handle an index pulse between both."""
         old, new = self._seen.value, self._levels()
         self._seen.value = new
         mode = self.con["QEIM"]
@@ -106,7 +106,7 @@ class Qei(Peripheral):
                 self._line.request()
 
     def _index_pulse(self, mode: int) -> None:
-        """Handle an index pulse: if POSRES is set, it resets the counter; it requests the interrupt (§14.2)."""
+        """Handle an index pulse: reset the counter if POSRES is set, and request the interrupt (§14.2)."""
         if mode & _BY_MATCH:
             return
         if self.con["POSRES"]:

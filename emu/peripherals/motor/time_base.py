@@ -49,7 +49,7 @@ class TimeBase:
         return max(2 * self.period - ticks, 0), True
 
     def cycle_of(self, count: int, downwards: bool) -> int:
-        """Return the first cycle in which PTMR has a value while it counts in a direction; NEVER if it has not."""
+        """Return the first cycle in which PTMR equals `count` and counts in that direction; NEVER if there is none."""
         if count > self.period or (downwards and not self.centred):
             return NEVER
         return self.zero + self.tick * (2 * self.period - count if downwards else count)

@@ -1,8 +1,8 @@
 """Run-time programming of flash and EEPROM (§16): NVMCON, NVMADR, NVMADRU, NVMKEY.
 
-An operation reads its row address and latches when it starts, and changes the memory when it ends 2 ms later. Flash
-operations stall the CPU for that time; EEPROM operations do not. A reset during an operation sets WRERR and leaves the
-row erased but not programmed (§16).
+When an operation starts, it reads the row address and the write latches. When it ends, 2 ms later, it changes the
+memory. Flash operations stall the CPU for that time; EEPROM operations do not. A reset during an operation sets WRERR
+and leaves the row erased but not programmed (§16).
 """
 
 from __future__ import annotations

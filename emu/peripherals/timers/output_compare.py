@@ -135,7 +135,8 @@ class Compare(Peripheral):
         if mode == _OFF:
             self._port.release(self._pin)
             return
-        preset = mode == _TOGGLE and bool(self._port.lat.value & self._pin)  # UNVERIFIED (§9)
+        # UNVERIFIED: in toggle mode the pin starts at the level of its LAT bit (§9).
+        preset = mode == _TOGGLE and bool(self._port.lat.value & self._pin)
         self._level.value = mode == _CLEAR_ONCE or preset
         self._phase.value = _RISE
         self._port.claim(self._pin, drive=True, level=self._level.value)
