@@ -50,7 +50,6 @@ class Noise:
         if not self._strength.value:
             return 0.0
         x = _splitmix64(self._seed.value, channel, cycle)
-        uniform = (
-            sum(x >> shift & 0xFFFF for shift in (0, 16, 32, 48)) / 0x10000 - 2
-        )  # sum of four uniform random numbers, each with variance 1/12
-        return uniform * 3**0.5 * deviation * self.strength
+        # The sum of four uniform random numbers, each with variance 1/12, has the standard deviation 1 / 3**0.5.
+        total = sum(x >> shift & 0xFFFF for shift in (0, 16, 32, 48)) / 0x10000 - 2
+        return total * 3**0.5 * deviation * self.strength

@@ -29,7 +29,7 @@ _SETTLED: Final = 9.2
 _DECAYED: Final = 45.0
 """Time constants after which a switch of the emitter no longer affects a level: 4095 e^-45 is 1e-16."""
 _EDGES: Final = 128
-"""Twin of EDGES in ring.c."""
+"""Capacity of the queue of edges from native code; equals EDGES in ring.c."""
 _FASTEST_HZ: Final = 30e6
 """Frequency in Hz of the fastest instruction clock (chip §3)."""
 AMBIENT: Final = 3800  # UNVERIFIED: 3500 to 4000 indoors (epuck.md §5)
@@ -170,7 +170,7 @@ class Infrared(BoardPart):
             self.pins.handle_natively(port, mask, replaced, address_of(_code()["edge"]), self._ring_at)
 
     def emit_in_python(self) -> None:
-        """Let Python handle all edges of the pulse lines again. The record then has no edges that wait."""
+        """Let Python handle all edges of the pulse lines again. First apply the edges that wait in the record."""
         self._apply_edges()
         for port in {port for port, _ in self._lines}:
             self.pins.handle_natively(port, 0, (), 0, 0)

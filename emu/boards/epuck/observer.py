@@ -53,9 +53,8 @@ class RobotObserver:
             return
         second = self._board.chip.fcy
         last, self._last_report = self._last_report, cycle
-        self._next_report = cycle + round(
-            _PAUSE_SECONDS * second
-        )  # set before the other motor is read, because that may call this method
+        # Set it before the other motor is read, because the read may call this method.
+        self._next_report = cycle + round(_PAUSE_SECONDS * second)
         steps = [self._board.motors.left.steps, self._board.motors.right.steps]
         text = f"motors {steps[0]} {steps[1]} steps"
         if last is not None:

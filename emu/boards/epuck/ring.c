@@ -1,8 +1,8 @@
 // Levels of the eight infrared sensors (epuck.md §5, §10): ambient light, minus the own emitter's reflection times the
 // settled share, minus external light, plus noise. Levels are in the unit of the ADC: counts << 4.
 //
-// Conversions are computed later than they sample. So an edge of a pulse line from native code waits in `edges` until a
-// conversion samples after it.
+// A conversion is computed some time after the cycle in which it samples. An edge of a pulse line from native code
+// therefore waits in `edges` until a conversion samples after it.
 
 #include <stdint.h>
 
@@ -21,8 +21,8 @@ static const f64 ROOT_3 = 1.73205080756887729353;
 struct light; // both are defined by the provider of the external light
 struct emission;
 
-// The first eleven members are byte offsets in the machine's record; `native` is that of the pins of each line's port
-// whose edges come here. `past_*` apply before cycle `begin`.
+// The first eleven members are byte offsets in the machine's record. `native` points to `Pins.native_cell` of each line's
+// port: the pins whose edges native code passes to `edge`. `past_*` apply before cycle `begin`.
 struct ring {
     i64 ambient, reflection, lit, since, from, tau, seed, strength, edges, edge_count, native[LINES];
     i64 port[LINES], pin[LINES]; // port and mask of each pulse line

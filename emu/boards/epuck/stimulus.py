@@ -11,11 +11,11 @@
     3.5s    uart1     "x" framing     the same with a broken stop bit; also parity, break
     4.0s    pin       RF6 0           any input pin
     5.0s    camera    unplug          or: plug
-     5.0s    picture   room.png        scene of the camera; paths are relative to the working folder
+    5.0s    picture   room.png        scene of the camera; paths are relative to the working folder
     6.0s    lamp      0.5             brightness of the scene, 1 = as in the picture
     7.0s    bluetooth down            or: up
-     8.0s    i2c       sda 5           SDA is held low for 5 clocks (0: until `free`); or: scl, free
-     0       noise     1               sensor noise: 1 = the reference's deviations, 0 = none
+    8.0s    i2c       sda 5           SDA is held low for 5 clocks (0: until `free`); or: scl, free
+    0       noise     1               sensor noise: 1 = the reference's deviations, 0 = none
 
 Files called *.vcd and *.csv are waveforms, which stimulus_import.py converts to the same events.
 

@@ -1,7 +1,7 @@
 """Waveform files as stimulus: conversion of CSV and VCD files to stimulus events.
 
 CSV   a header line with column names, then one line per time: `time` in s, then pins and uart1, uart2 (a byte, 0 to
- 255). An empty cell changes nothing.
+      255). An empty cell changes nothing.
 VCD   one-bit wires whose names begin with a pin name (`RB3`, `RC1_front`), in any scope. Other variables and the
       values x and z are ignored. `emu run --vcd` writes such files.
 """

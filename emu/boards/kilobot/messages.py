@@ -30,7 +30,7 @@ TYPES: Final = {"boot": 0x80, "reset": 0x83, "sleep": 0x84, "wakeup": 0x85, "cha
                 "run": 0x88, "readuid": 0x89, "calibrate": 0x8A}  # fmt: skip
 """Message types of the overhead controller's commands."""
 MOST_UID: Final = 0xFFFF
-"""Greatest number of a robot: its EEPROM has two bytes for it."""
+"""Largest number (UID) of a robot: its EEPROM has two bytes for it."""
 OHC_GAP: Final = 48_000
 """Ticks between two messages of the overhead controller: 6 ms."""
 
@@ -55,7 +55,7 @@ def crc16(octets: bytes) -> int:
 
 
 def frame(message: Message) -> bytes:
-    """Return the 12 bytes of a message on air. Raises ValueError if it has not 9 data bytes."""
+    """Return the 12 bytes that are sent for a message. Raises ValueError if it does not have 9 data bytes."""
     if len(message.data) != DATA_SIZE:
         raise ValueError(f"a message has {DATA_SIZE} data bytes, not {len(message.data)}")
     content = message.data + bytes([message.type])

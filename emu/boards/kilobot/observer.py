@@ -53,7 +53,7 @@ class Report:
 
 
 def led_of(registers: dict[int, int]) -> tuple[int, int, int]:
-    """Return red, green and blue, 0 to 3 each, of the registers' values."""
+    """Return the LED's red, green and blue, 0 to 3 each, for these values of registers."""
 
     def level(pins: Iterable[tuple[int, int, int]]) -> int:
         return sum(
@@ -67,7 +67,7 @@ def led_of(registers: dict[int, int]) -> tuple[int, int, int]:
 
 
 def motors_of(registers: dict[int, int]) -> tuple[int, int]:
-    """Return the duties of the left and the right motor, 0 to 255, of the registers' values."""
+    """Return the duties of the left and the right motor, 0 to 255, for these values of registers."""
     if not registers.get(TCCR2B, 0) & 7:
         return 0, 0
     control = registers.get(TCCR2A, 0)
@@ -109,7 +109,7 @@ class KilobotObserver:
             yield from self._settled(since, kind)
 
     def final_reports(self) -> Iterator[Report]:
-        """Yield what is still held back at the end of a run: the last states, and an unfinished line of the UART."""
+        """Yield the reports that are pending at the end of a run: the last states, and an incomplete UART line."""
         for since, kind in sorted((since, kind) for kind, (since, _) in self._waiting.items()):
             yield from self._settled(since, kind)
         if self._text:
@@ -143,20 +143,20 @@ class KilobotObserver:
         if change.register == MCUSR and is_reset(change.value ^ changed, change.value):
             self._registers = {MCUSR: change.value}
             yield Report(change.cycle, "reset", {"cause": "watchdog"})
-            self._note("led", (0, 0, 0), change.cycle)
-            self._note("motors", (0, 0), change.cycle)
+            self._store_state("led", (0, 0, 0), change.cycle)
+            self._store_state("motors", (0, 0), change.cycle)
         if changed & LIGHT_BITS.get(change.register, 0) and self._is_lit() and not was_lit:
             message = self._decoder.pulse(change.cycle)
             if message is not None:
                 yield Report(change.cycle, "message", {"type": message.type, "data": message.data.hex(),
                                                        "crc": "right" if message.is_whole else "wrong"})  # fmt: skip
         if changed & LED_BITS.get(change.register, 0):
-            self._note("led", led_of(self._registers), change.cycle)
+            self._store_state("led", led_of(self._registers), change.cycle)
         if changed & MOTOR_BITS.get(change.register, 0):
-            self._note("motors", motors_of(self._registers), change.cycle)
+            self._store_state("motors", motors_of(self._registers), change.cycle)
 
-    def _note(self, kind: str, state: tuple[int, ...], cycle: int) -> None:
-        """Note that LED or motors have a state from a cycle on; it is reported once it has settled."""
+    def _store_state(self, kind: str, state: tuple[int, ...], cycle: int) -> None:
+        """Store the state that LED or motors have from a cycle on. It is reported once it has lasted SETTLED cycles."""
         if self._waiting.get(kind, (0, self._reported[kind]))[1] != state:
             self._waiting[kind] = (cycle, state)
 

@@ -10,7 +10,7 @@ from emu.boards.kilobot.swarm import KilobotSwarm
 def broadcast(swarm: KilobotSwarm, command: str | Message, seconds: float) -> None:
     """Repeat a message for a time while the swarm runs, every 10.4 ms and without carrier sense.
 
-    `command`: a key of TYPES, or a message of its own. All robots receive it as strong as possible. Raises ValueError,
+    `command`: a key of TYPES, or any other message. All robots receive it with full strength. Raises ValueError,
     KilobotFaultError.
     """
     message = command if isinstance(command, Message) else Message(bytes(DATA_SIZE), TYPES[command])

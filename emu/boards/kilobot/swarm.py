@@ -45,7 +45,7 @@ EMITTERS: Final = 0xC7
 """Pins of port B that may be emitters (kilobot.md §1)."""
 PULSE_TICKS: Final = 9
 EDGES: Final = 256
-"""Room for edges of light that are on their way to a robot, and two for each other robot (air.c)."""
+"""Capacity of a robot's queue of light edges, without the two edges for each other robot that are added (air.c)."""
 ADC6, ADC7, AIN1 = 6, 7, 10
 LOSS_ONE: Final = 1 << 16
 ONE_RATE: Final = 1 << 32
@@ -61,14 +61,14 @@ class KilobotFaultError(Exception):
 
 
 class _Edge(Structure):
-    """`struct edge` of air.c."""
+    """Mirror of `struct edge` in air.c."""
 
     _fields_ = [("at", c_uint64), ("high_uv", c_uint32), ("low_uv", c_uint32), ("change", c_int32),
                 ("sender", c_uint32)]  # fmt: skip
 
 
 class _Link(Structure):
-    """`struct link` of air.c."""
+    """Mirror of `struct link` in air.c."""
 
     _fields_ = [(name, c_uint32) for name in ("high_uv", "low_uv", "loss", "shown")]
     high_uv: int
@@ -77,7 +77,7 @@ class _Link(Structure):
 
 
 class _Robot(Structure):
-    """`struct robot` of air.c."""
+    """Mirror of `struct robot` in air.c."""
 
     _fields_ = [("avr", c_void_p), ("code", c_void_p),
                 *((name, c_uint64) for name in ("on_at", "rate", "period")),
@@ -90,7 +90,7 @@ class _Robot(Structure):
 
 
 class _Air(Structure):
-    """`struct air` of air.c."""
+    """Mirror of `struct air` in air.c."""
 
     _fields_ = [("count", c_int64), *((name, c_void_p) for name in ("robots", "links", "acts", "run", "input")),
                 *((name, c_uint64) for name in ("delay", "seed", "room", "lost_edges"))]  # fmt: skip
@@ -122,22 +122,24 @@ class KilobotSetup:
     """Position of its centre in mm."""
     y: float = 0.0
     number: int | None = None
-    """Its UID; None: an erased EEPROM."""
+    """Its UID; None for a robot whose EEPROM has none."""
     on_at: float = 0.0
     """Time of power-on in seconds."""
     calibrated: bool = True
     """Whether its EEPROM has motor duties and the tables of strength by distance."""
     clock: float = 1.0
-    """Frequency of its oscillator by the nominal 8 MHz."""
+    """Frequency of its oscillator divided by the nominal 8 MHz."""
     duties: tuple[int, ...] = tuple(DUTIES.values())
     """Calibrated duties of its motors in the order of DUTIES."""
 
 
 class KilobotSwarm:
-    """Kilobots at power-on. `loss`: part of the pulses, 0 to 1, that a receiver misses, or a curve over the distance:
-    points (mm, part), linear between them and constant beyond. `delay`: ticks of 1/8 MHz after which light reaches
-    other robots, 18 or more. Raises ValueError.
-    """  # fmt: skip
+    """Kilobots at power-on.
+
+    `loss`: share of the pulses, 0 to below 1, that a receiver misses. It may be a curve over the distance instead:
+    points (mm, share), linear between them and constant beyond. `delay`: ticks of 1/8 MHz after which light reaches
+    other robots, 18 or more. `reach`: range in mm between the centres of two robots. Raises ValueError.
+    """
 
     def __init__(self, robots: Sequence[KilobotSetup], *, seed: int = 1, loss: float | Sequence[Sequence[float]] = 0.0,
                  delay: int = 32, reach: float = REACH_MM) -> None:  # fmt: skip
@@ -177,10 +179,10 @@ class KilobotSwarm:
             address_of(functions["avr_run"]), address_of(functions["avr_input"]), delay,
             seed * 2_654_435_761 % (1 << 63) | 1, room,
         )  # fmt: skip
-        self._look_at(np.arange(count))
+        self._update_links(np.arange(count))
 
-    def _look_at(self, moved: NDArray[np.intp]) -> None:
-        """Set the links between some robots and all others, both ways."""
+    def _update_links(self, moved: NDArray[np.intp]) -> None:
+        """Compute the links between the robots `moved` and all others, in both directions."""
         if self._table is None:
             return
         apart = self.places[moved][:, None] - self.places[None]
@@ -196,25 +198,25 @@ class KilobotSwarm:
     def move(self, robot: int, x: float, y: float) -> None:
         """Move a robot to a position in mm, at once."""
         self.places[robot] = (x, y)
-        self._look_at(np.array([robot]))
+        self._update_links(np.array([robot]))
 
     def move_all(self, places: NDArray[np.float64]) -> None:
-        """Move all robots to positions in mm, at once: an array of robots x 2. Robots at rest take no time."""
+        """Move all robots to positions in mm, at once: an array of robots x 2. Robots that stay cost no time."""
         moved = np.flatnonzero((places != self.places).any(axis=1))
         if moved.size:
             self.places[moved] = places[moved]
-            self._look_at(moved)
+            self._update_links(moved)
 
     def stop(self, robot: int) -> None:
-        """Stop a robot for good, as after a fault or without its battery. It sends and receives no more light."""
+        """Stop a robot permanently, as after a fault or without its battery. It sends and receives no more light."""
         self._functions["air_stop"](addressof(self._air), robot)
 
     def flash(self, robot: int, after_us: float, distance: float = 0.0) -> None:
-        """Let one robot receive a light pulse of 9 ticks in some us, as strong as of a robot at a distance in mm."""
+        """Send one robot a light pulse after `after_us`, as strong as that of a robot at `distance` mm."""
         self.light(robot, self.now + int(after_us * HZ / 1e6), distance)
 
     def light(self, robot: int, tick: int, distance: float = 0.0) -> None:
-        """Let one robot receive a light pulse at a tick of the future, as `flash`. At most 100 may wait."""
+        """Send one robot a light pulse of 9 ticks at a future tick; `distance` as in `flash`. At most 100 may wait."""
         strengths = [microvolts(counts(gain, distance)) for gain in (HIGH_GAIN_MM, LOW_GAIN_MM)]
         self._functions["air_flash"](addressof(self._air), robot, tick, PULSE_TICKS, *strengths)
 
@@ -249,7 +251,7 @@ class KilobotSwarm:
             raise ValueError("more pulses of light wait for a robot than there is room for")
 
     def close(self) -> None:
-        """End the swarm. It holds memory only."""
+        """Do nothing: a swarm holds only memory. The method is for the `with` statement."""
 
     def __enter__(self) -> KilobotSwarm:
         return self
@@ -263,7 +265,8 @@ def set_up(
 ) -> None:
     """Connect the parts of a Kilobot to a machine that was not started yet, and write its EEPROM.
 
-    `number` is its UID, `duties` the calibrated ones of the motors in the order of DUTIES."""
+    `number` is its UID, None for an erased one; `duties` are its calibrated motor duties in the order of DUTIES.
+    """
     if number is not None:
         machine.write_eeprom(NUMBER_AT, struct.pack("<H", number))
     if calibrated:

@@ -1,7 +1,7 @@
 """Exposure of the camera: lamp brightness, manual exposure, automatic exposure control (epuck.md §7.6).
 
-A scene's pixel values hold at brightness 1. In each frame, automatic control removes a constant share of the difference
-to the exposure that compensates the lamp. Its state is an exposure value and the cycle at which it was valid.
+A scene's pixel values hold at brightness 1. Automatic control approaches the exposure that compensates the lamp: each
+frame reduces the difference by a constant factor. Its state is an exposure value and the cycle at which it was valid.
 """
 
 from __future__ import annotations
