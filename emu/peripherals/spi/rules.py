@@ -98,8 +98,8 @@ def finish(m: RuleBuilder, s: SpiOperands, number: Number, when: Number = True) 
     request(m, s.line, m.now, is_new)
 
 
-def open_end(m: RuleBuilder, s: SpiOperands) -> Number:
-    """Return the word that a master reads without a connected device: every bit is the level of SDI."""
+def undriven_word(m: RuleBuilder, s: SpiOperands) -> Number:
+    """Return the word that a master receives from SDI without a connected device: every bit is the pin's level."""
     return m.select((m.get(s.level) & s.sdi) != 0, 0xFFFF, 0)
 
 
@@ -112,5 +112,5 @@ def fire(m: RuleBuilder, s: SpiOperands) -> None:
     """Handle the end of a word sent by a master, and start the next one."""
     m.require(((m.get(s.con) & s.bit["MSTEN"]) != 0) & (m.get(s.has_device) == 0))
     m.require(m.get(s.logged) == 0)
-    finish(m, s, open_end(m, s), m.get(s.busy) != 0)
+    finish(m, s, undriven_word(m, s), m.get(s.busy) != 0)
     begin(m, s, m.now, bit_time(m, s), waits_to_begin(m, s))

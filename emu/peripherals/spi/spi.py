@@ -21,9 +21,9 @@ from emu.peripherals.spi.rules import (
     bit_time,
     finish,
     fire,
-    open_end,
     push,
     read_buffer,
+    undriven_word,
     waits_to_begin,
     word_bits,
 )
@@ -119,8 +119,10 @@ class Spi(Peripheral):
                 word = self._reply.value
                 if self.on_slave_word is not None:
                     self.on_slave_word(out, due)
+            elif self.exchange is None:
+                word = int(undriven_word(rules, operands))
             else:
-                word = int(open_end(rules, operands)) if self.exchange is None else self.exchange(out, self.word_bits)
+                word = self.exchange(out, self.word_bits)
             finish(rules, operands, word)
         if waits_to_begin(rules, operands):
             begin(rules, operands, due, self.bit_time)

@@ -43,7 +43,7 @@ class Counter(Peripheral):
         return self.upper is not None and bool(self.con["T32"])
 
     @property
-    def is_taken(self) -> bool:
+    def is_upper_half(self) -> bool:
         """Whether this timer is the upper half of a 32-bit timer."""
         return self.lower is not None and self.lower.is_wide
 
@@ -80,7 +80,7 @@ class Counter(Peripheral):
 
     def count(self, cycle: int) -> int:
         """Return the count at `cycle`, which must not precede the last write to the timer."""
-        if self.is_taken:
+        if self.is_upper_half:
             assert self.lower is not None
             return self.lower.count(cycle) >> 16
         if self._source.value == PIN:
@@ -94,7 +94,7 @@ class Counter(Peripheral):
 
     def next_cycle_at(self, target: int, after: int) -> int:
         """Return the first cycle after `after` at which the count becomes `target`, or NEVER."""
-        if self.is_taken or self.is_frozen:
+        if self.is_upper_half or self.is_frozen:
             return NEVER
         source = self._source.value
         if source == PIN:  # of the edges, only those that have already occurred are known

@@ -115,7 +115,7 @@ class Timer(Counter):
         """Store `tick` and `period` for the rules, and post the next match after the current cycle."""
         self.clear_until.value = 0
         source = self._source.value
-        simple = source == TCY and not self.is_taken
+        simple = source == TCY and not self.is_upper_half
         if simple:
             self._empty_prescaler()
         narrow = simple and not self.is_wide  # a wide timer is read and interrupts through its partner
@@ -157,7 +157,7 @@ class Timer(Counter):
         return bool(self.con["TGATE"]) and not self.con["TCS"]
 
     def _choose_source(self) -> int:
-        if self.is_taken or not self.con["TON"]:
+        if self.is_upper_half or not self.con["TON"]:
             return STOPPED
         if self.con["TCS"]:
             return WAVEFORM if self.context.pins.waveform(self._port, self._pin) is not None else PIN
@@ -167,7 +167,7 @@ class Timer(Counter):
 
     def _tmr_written(self, _old: int, new: int, lanes: int) -> None:
         """Handle a write to TMR. The count applies from the next cycle on; the prescaler restarts (§7 rules 6, 8)."""
-        if self.is_taken:
+        if self.is_upper_half:
             assert self.low is not None
             self.low.high_written(new, lanes)
             return
@@ -205,7 +205,7 @@ class Timer(Counter):
 
     def _period_written(self, old: int, new: int, _lanes: int) -> None:
         """Handle a write to PR. Counts up to the next cycle still use the old PR."""
-        owner = self.low if self.is_taken and self.low is not None else self
+        owner = self.low if self.is_upper_half and self.low is not None else self
         shift = 0 if owner is self else 16
         previous = owner.limit & ~(0xFFFF << shift) | old << shift
         if old != new:
@@ -267,7 +267,7 @@ class Timer(Counter):
     # -- external clock and gate -------------------------------------------------------------------------------------
 
     def _edge(self, cycle: int, _changed: int, levels: int) -> None:
-        if self.is_frozen or self.is_taken or not self.con["TON"]:
+        if self.is_frozen or self.is_upper_half or not self.con["TON"]:
             return
         rising = bool(levels & self._pin)
         if self.con["TCS"]:
@@ -353,7 +353,7 @@ class Timer(Counter):
         """Whether the clock stops. Only timer 1 as asynchronous counter runs in Sleep (§7)."""
         if mode == SLEEP:
             return not (self.site.kind == "A" and self.con["TCS"] and not self.con["TSYNC"])
-        owner = self.low if self.is_taken and self.low is not None else self
+        owner = self.low if self.is_upper_half and self.low is not None else self
         return mode == IDLE and bool(owner.con["TSIDL"])
 
     def freeze(self, cycle: int, mode: int) -> None:
@@ -370,7 +370,7 @@ class Timer(Counter):
         """
         waiting = self.remaining_delay(self._match)
         super().thaw(cycle)
-        if not self.is_taken and self.con["TON"] and (self.con["TCS"] or self.con["TGATE"]):
+        if not self.is_upper_half and self.con["TON"] and (self.con["TCS"] or self.con["TGATE"]):
             self._source.value = self._choose_source()
             self.tick.value = self._prescale if self._source.value == TCY and not self.is_wide else 0
             if self.con["TCS"] and (waiting == NEVER or waiting > 1):
