@@ -73,14 +73,14 @@ def run(options: argparse.Namespace) -> int:
     key = None if options.key is None else read_key(options.key)
     if is_program(image):
         program = program_of(image)
-        return _with_robot(options, _Spreading(options, program if key is None else authenticated(program, key)))
+        return _with_robot(options, _ProgramTransfer(options, program if key is None else authenticated(program, key)))
     if options.store:
         raise ValueError(f"{image.path}: --store is for programs that `openswarm program` has built")
     checked(image)
     keys = [] if key is None else [key_row(image, key)]
     for what in unwritten_parts(image):
         print(f"openswarm flash: note: {what} of the image are not written; a programmer does that", file=sys.stderr)
-    return _with_robot(options, _Loading(options, image, keys))
+    return _with_robot(options, _FirmwareTransfer(options, image, keys))
 
 
 class _Job(Protocol):
@@ -103,7 +103,7 @@ class _Job(Protocol):
         """Return the result of the transfer as text."""
 
 
-class _Loading:
+class _FirmwareTransfer:
     """Transfer of firmware through a boot loader."""
 
     wanted = "a boot loader"
@@ -131,7 +131,7 @@ class _Loading:
                 f" boot loader {self._session.loader.name}")  # fmt: skip
 
 
-class _Spreading:
+class _ProgramTransfer:
     """Transfer of a program to running firmware."""
 
     wanted = "a robot that takes programs"
@@ -145,7 +145,7 @@ class _Spreading:
 
     def converse(self, line: SerialPort, progress: Callable[[int, int], None]) -> None:
         self._neighbour = HostNeighbour(line, self._program, self._options.wait)
-        self._is_active = self._neighbour.give(progress)
+        self._is_active = self._neighbour.send(progress)
         if not self._is_active and not self._options.store:
             self._neighbour.activate()
             self._is_active = True
@@ -174,10 +174,10 @@ def _with_robot(options: argparse.Namespace, job: _Job) -> int:
             return report_error(f"openswarm flash: {error}", FAULT, options.json)
         except OSError as error:
             progress.end()
-            raise OSError(f"{error}; {progress.reached(job.keeps)}") from None
+            raise OSError(f"{error}; {progress.state(job.keeps)}") from None
         except KeyboardInterrupt:
             progress.end()
-            print(f"openswarm flash: interrupted; {progress.reached(job.keeps)}", file=sys.stderr)
+            print(f"openswarm flash: interrupted; {progress.state(job.keeps)}", file=sys.stderr)
             raise
         seconds = line.now() - began
     if options.json:
@@ -204,8 +204,8 @@ class _Progress:
         if self._shows and self._done != self._total:
             print(file=sys.stderr)
 
-    def reached(self, keeps: str) -> str:
-        """Return the state of the robot after an interrupted transfer."""
+    def state(self, keeps: str) -> str:
+        """Return the state of the robot after an interrupted transfer. `keeps`: what becomes of the written rows."""
         if not self._done:
             return "no row is written"
         if self._done == self._total:

@@ -21,7 +21,7 @@ def _rotated(word: int, by: int) -> int:
 
 
 def _permuted(state: list[int], rounds: int) -> list[int]:
-    """Return the state after the last `rounds` of the twelve rounds."""
+    """Return the state after a permutation: the last `rounds` of the twelve rounds."""
     x0, x1, x2, x3, x4 = state
     for number in range(12 - rounds, 12):
         x2 ^= (0xF - number) << 4 | number

@@ -42,8 +42,8 @@ _END_COMMAND: Final = 0xFF
 _END_ADDRESS: Final = 1
 """Address field of the end block; its low half must not be 0.
 
-Before the e-puck's loader starts the program, it lights an LED for about 13 ms times this half, and for ever if that
-is 0.
+Before the e-puck's loader starts the program, it lights an LED for about 13 ms times this half; with 0, it never starts
+the program.
 """
 
 

@@ -1,7 +1,7 @@
 """Transfer of a program to a running robot: the host acts as a neighbour robot at the other end of a serial line.
 
-The transfer ends when the robot, after checking the CRC, advertises the program, or with a `RobotError`. Other
-output of the robot, such as text, is skipped.
+The transfer ends when the robot has checked the CRC and advertises the program, or with a `RobotError`. Other output
+of the robot, such as text, is skipped.
 """
 
 from __future__ import annotations
@@ -84,13 +84,13 @@ class HostNeighbour:
         facts = Advertisement(self._program.version, len(self._program.rows), self._program.crc, is_active)
         self._line.write(framed(facts.packed()))
 
-    def _is_it(self, said: Advertisement | Request) -> bool:
+    def _matches(self, said: Advertisement | Request) -> bool:
         if isinstance(said, Request):
             return (said.version, said.identity) == (self._program.version, identity(self._program.crc))
         return (said.version, said.rows, said.crc) == (
             self._program.version, len(self._program.rows), self._program.crc)  # fmt: skip
 
-    def give(self, progress: Callable[[int, int], None]) -> bool:
+    def send(self, progress: Callable[[int, int], None]) -> bool:
         """Send the program until the robot has all of it; return whether the robot has activated it.
 
         `progress` is called with the number of received rows and the total. Raises RobotError if the robot requests
@@ -110,12 +110,12 @@ class HostNeighbour:
             asks = False
             for said in self._messages(self._line.now() + GREETING_SECONDS):
                 if isinstance(said, Request):
-                    if self._is_it(said) and said.row < total and said.parts:
+                    if self._matches(said) and said.row < total and said.parts:
                         asks = True
-                        limit = self._line.now() + self._wait if self._gets_on(said) else limit
+                        limit = self._line.now() + self._wait if self._is_progress(said) else limit
                         progress(said.row, total)
                         self._serve(said)
-                elif self._is_it(said):
+                elif self._matches(said):
                     progress(total, total)
                     return said.is_active
                 else:
@@ -129,14 +129,14 @@ class HostNeighbour:
     def _check(self, said: Advertisement) -> None:
         self._own = said.version
         if said.version > self._program.version:
-            raise RobotError(f"the robot has version {said.version}, and takes only what is above it: " + (
+            raise RobotError(f"the robot has version {said.version} and accepts only a higher one: " + (
                 f"build the program with --version {said.version + 1} or more" if said.version < LAST_VERSION else
-                "there is none, so nothing can replace it but a programmer"))  # fmt: skip
+                "there is none, so only a programmer can replace it"))  # fmt: skip
         if said.version == self._program.version:
             raise RobotError(f"the robot has another program of version {said.version}: give this one a higher one")
 
-    def _gets_on(self, request: Request) -> bool:
-        """Whether the robot has made progress, or restarts the transfer within the permitted number of times."""
+    def _is_progress(self, request: Request) -> bool:
+        """Whether a request shows progress, or restarts the transfer. Raises RobotError after MOST_RESETS restarts."""
         before, self._asked = self._asked, request
         if before is None or request.row > before.row:
             return True
@@ -144,8 +144,9 @@ class HostNeighbour:
             self.counts.resets += 1
             if self.counts.resets > MOST_RESETS:
                 raise RobotError(
-                    f"the robot has restarted {self.counts.resets} times, at last from row {before.row}: it resets"
-                    " meanwhile, its flash does not hold, or the program lacks the tag of the robot's key (--key)"
+                    f"the robot has restarted the transfer {self.counts.resets} times, last from row {before.row}: it"
+                    " resets during the transfer, its flash does not keep data, or the program lacks the tag of the"
+                    " robot's key (--key)"
                 )
             return True
         lacking = before.parts & request.parts
@@ -166,21 +167,21 @@ class HostNeighbour:
             return ("the robot does not keep the program after its last row: the line or its flash is damaged, or the"
                     " program lacks the tag of the robot's key (--key)")  # fmt: skip
         if self._asked is not None:
-            what = "asks again and again for" if asks else "fell silent at"
-            return f"the robot {what} row {self._asked.row}: what it has stays there, run the command again"
+            what = "repeats its request for" if asks else "fell silent at"
+            return f"the robot {what} row {self._asked.row}: it keeps the rows that it has, run the command again"
         if self._own is not None:
             return (f"the robot has version {self._own} and does not ask for version {self._program.version}: the"
-                    f" program that runs is on trial still, or its flash does not hold")  # fmt: skip
-        return (f"no robot answered within {self._wait:g} s: its firmware has to take programs from this port, as"
+                    f" running program is still on trial, or the flash does not keep data")  # fmt: skip
+        return (f"no robot answered within {self._wait:g} s: its firmware must accept programs from this port, as"
                 f" firmware/apps/spreading does")  # fmt: skip
 
     def activate(self) -> None:
-        """Wait until the robot advertises the program as activated. Raises RobotError if it does not."""
+        """Advertise the program as active until the robot does, too. Raises RobotError if the robot does not."""
         limit = self._line.now() + self._wait
         while self._line.now() < limit:
             self._advertise(True)
             self._greet()  # advertise version 0: after an advertisement equal to its own the robot stays silent
             for said in self._messages(self._line.now() + GREETING_SECONDS):
-                if isinstance(said, Advertisement) and self._is_it(said) and said.is_active:
+                if isinstance(said, Advertisement) and self._matches(said) and said.is_active:
                     return
         raise RobotError(f"the robot has version {self._program.version} and does not activate it")

@@ -82,7 +82,7 @@ def _built(source: Path, flags: tuple[str, ...], folders: pytest.TempPathFactory
 
 
 def _made(folder: Path) -> Path:
-    """Return the image of a project with a Makefile; a lock serialises the builds of several processes."""
+    """Build a project with its Makefile and return the image. A lock serialises the builds of several processes."""
     from emu import BuildError
 
     with (folder / "Makefile").open(encoding="utf-8") as lock:

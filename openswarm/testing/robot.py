@@ -238,7 +238,7 @@ class Robot:
         return self.fault
 
     def stack(self, thread: str) -> Thread:
-        """Return an OpenSwarm thread by the name of its function; `.free` is its number of never written stack bytes.
+        """Return an OpenSwarm thread by the name of its function; `.free` counts stack bytes that were never written.
 
         Raises KeyError for an unknown name.
         """

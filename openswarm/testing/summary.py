@@ -1,7 +1,7 @@
 """Markdown table of a JUnit file, for the summary of a CI job: `python -m openswarm.testing.summary results.xml`.
 
-Failed tests are listed with the plugin's report on their robot. The exit status is 0, or 2 if the file is no JUnit
-file.
+Failed tests are listed with the report of the pytest plugin on their robot. The exit status is 0, or 2 if the file is
+no JUnit file.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ CLOCK_HZ = 14_745_600
 def table(root: ElementTree.Element) -> list[str]:
     """Return the lines of the Markdown table of a JUnit file."""
     lines = ["| test | result | simulated |", "|---|---|---|"]
-    told = []
+    failures = []
     for case in root.iter("testcase"):
         name = f"{case.get('classname')}::{case.get('name')}"
         failure = case.find("failure") if case.find("failure") is not None else case.find("error")
@@ -28,10 +28,10 @@ def table(root: ElementTree.Element) -> list[str]:
         if failure is not None:
             report = Path(properties.get("robot_artefacts", "")) / "report.txt"
             text = report.read_text(encoding="utf-8").rstrip() if report.is_file() else failure.get("message", "")
-            told += ["", f"**{name}**", "", "```", text, "```"]
+            failures += ["", f"**{name}**", "", "```", text, "```"]
             folder = properties.get("robot_artefacts")
-            told += [f"Reports and waveform: `{folder}`"] if folder else []
-    return lines + told
+            failures += [f"Reports and waveform: `{folder}`"] if folder else []
+    return lines + failures
 
 
 def main(arguments: list[str]) -> int:

@@ -126,10 +126,10 @@ class Robot:
                 self.has, self.wants, self.asks_at, self.says_at = self.wants, None, 1e9, self.time + 0.5
 
 
-def give_program(robot: Any, program: Program = PROGRAM, wait: float = WAIT) -> tuple[HostNeighbour, list[int]]:
+def send_program(robot: Any, program: Program = PROGRAM, wait: float = WAIT) -> tuple[HostNeighbour, list[int]]:
     rows: list[int] = []
     neighbour = HostNeighbour(robot, program, wait)
-    if not neighbour.give(lambda done, total: rows.append(done)):
+    if not neighbour.send(lambda done, total: rows.append(done)):
         neighbour.activate()
     return neighbour, rows
 
@@ -139,7 +139,7 @@ def test_a_robot_takes_it_whatever_is_lost_and_however_late_it_speaks():
         robot, draw = Robot(3), random.Random(4)
         robot.late = lambda late=late: late
         robot.loses = lambda message, draw=draw: draw.random() < 0.3
-        neighbour, rows = give_program(robot, wait=200.0)
+        neighbour, rows = send_program(robot, wait=200.0)
         assert robot.has == Advertisement(7, 5, PROGRAM.crc, True)
         assert rows[-1] == 5
         assert neighbour.counts.resets == 0
@@ -154,7 +154,7 @@ def test_a_line_that_echoes_is_told_and_nothing_believed():
             self.say(message)
 
     with pytest.raises(RobotError, match="the line sends back what is written to it"):
-        give_program(Echo())
+        send_program(Echo())
 
 
 def test_the_command_tells_an_echo(tmp_path, capsys):
@@ -186,38 +186,38 @@ def built(folder: Path) -> Path:
     return out
 
 
-def test_a_robot_that_asks_and_does_not_get_on_is_given_up():
-    """A robot that makes no progress is given up.
+def test_requests_without_progress_end_the_transfer():
+    """The transfer ends with an error if the robot makes no progress.
 
-    It requests one row for ever, or different rows in turn, always with a missing part.
+    The robot requests one row for ever, or different rows in turn, always with a missing part.
     """
     robot = Robot()
     robot.loses = lambda message: message[0] == 0xC2
-    with pytest.raises(RobotError, match="the robot asks again and again for row 2: what it has stays there"):
-        give_program(robot)
+    with pytest.raises(RobotError, match="the robot repeats its request for row 2: it keeps the rows that it has"):
+        send_program(robot)
     assert robot.time < 2 * WAIT
     robot = Robot()
     robot.loses = lambda message: message[0] == 0xC3 and message[1] >> 3 == robot.time // 5 % 2
     robot.at_row = lambda row: setattr(robot, "lacking", robot.lacking | 3 * (row == 3))
-    with pytest.raises(RobotError, match="asks again and again for row 3"):
-        give_program(robot)
+    with pytest.raises(RobotError, match="repeats its request for row 3"):
+        send_program(robot)
     assert robot.time < 3 * WAIT
 
 
-def test_who_falls_silent_is_told_where():
+def test_silence_is_reported_with_the_row():
     robot = Robot()
     robot.at_row = lambda row: row == 3 and setattr(robot, "asks_at", 1e9)
-    with pytest.raises(RobotError, match="the robot fell silent at row 2: what it has stays there"):
-        give_program(robot)
+    with pytest.raises(RobotError, match="the robot fell silent at row 2: it keeps the rows that it has"):
+        send_program(robot)
     deaf = Robot()
     deaf.loses = lambda message: True
     with pytest.raises(RobotError, match="no robot answered within 30 s"):
-        give_program(deaf)
+        send_program(deaf)
     assert deaf.time < 2 * WAIT
 
 
 @pytest.mark.parametrize("resets", [MOST_RESETS, MOST_RESETS + 1])
-def test_a_robot_that_restarts_is_followed_some_times(resets: int):
+def test_the_robot_may_restart_the_transfer_some_times(resets: int):
     robot, left = Robot(), [resets]
 
     def reset(row: int) -> None:
@@ -230,26 +230,26 @@ def test_a_robot_that_restarts_is_followed_some_times(resets: int):
 
     robot.at_row = reset
     if resets <= MOST_RESETS:
-        assert give_program(robot)[0].counts.resets == resets
+        assert send_program(robot)[0].counts.resets == resets
     else:
-        with pytest.raises(RobotError, match=rf"restarted {resets} times, at last from row 3: it resets meanwhile"):
-            give_program(robot)
+        with pytest.raises(RobotError, match=rf"the transfer {resets} times, last from row 3: it resets during"):
+            send_program(robot)
 
 
 @pytest.mark.parametrize(("version", "says"), [
-    (8, "has version 8, and takes only what is above it: build the program with --version 9 or more"),
+    (8, "has version 8 and accepts only a higher one: build the program with --version 9 or more"),
     (65_534, "build the program with --version 65535"),
-    (65_535, "has version 65535, and takes only what is above it: there is none"),
+    (65_535, "has version 65535 and accepts only a higher one: there is none"),
 ])  # fmt: skip
 def test_what_is_not_newer_is_refused_with_what_would_be(version: int, says: str):
     with pytest.raises(RobotError, match=says):
-        give_program(Robot(version))
+        send_program(Robot(version))
 
 
 def test_the_last_version_is_taken():
     robot = Robot(65_534)
     neighbour = HostNeighbour(robot, Program(65_535, PROGRAM.rows), WAIT)
-    assert neighbour.give(lambda done, total: None) is False
+    assert neighbour.send(lambda done, total: None) is False
 
 
 def image(version: int | None, *blocks: tuple[int, list[int]], chip: str = "dsPIC30F6014A") -> Image:
