@@ -97,21 +97,21 @@ def test_a_robot_takes_checks_and_runs_what_the_host_has(robot, programs):
     line.write = damage  # type: ignore[method-assign]
     host = HostNeighbour(line, program, 20.0)
     received: list[int] = []
-    assert host.give(lambda done, total: received.append(done)) is False
+    assert host.send(lambda done, total: received.append(done)) is False
     assert received == sorted(received)
     assert {0, 1, 2, 3} == set(received)
     assert host.counts.requests > ROWS
     host.activate()
     run_until_stored(robot, program)
     line.drop()
-    assert HostNeighbour(line, program, 20.0).give(lambda done, total: None) is True  # the robot already has it
+    assert HostNeighbour(line, program, 20.0).send(lambda done, total: None) is True  # the robot already has it
     newer = HostNeighbour(line, of(programs[5]), 20.0)
-    assert newer.give(lambda done, total: None) is False
-    with pytest.raises(RobotError, match=r"the robot has version 5, and takes only what is above it: .* --version 6"):
-        HostNeighbour(line, program, 20.0).give(lambda done, total: None)
+    assert newer.send(lambda done, total: None) is False
+    with pytest.raises(RobotError, match=r"the robot has version 5 and accepts only a higher one: .* --version 6"):
+        HostNeighbour(line, program, 20.0).send(lambda done, total: None)
     other = Program(5, program.rows[:2])
     with pytest.raises(RobotError, match="the robot has another program of version 5"):
-        HostNeighbour(line, other, 20.0).give(lambda done, total: None)
+        HostNeighbour(line, other, 20.0).send(lambda done, total: None)
 
 
 @pytest.mark.slow
@@ -124,14 +124,14 @@ def test_a_robot_that_falls_silent_is_told(robot, programs):
     write = line.write
     line.write = lambda data: None  # type: ignore[method-assign]
     with pytest.raises(RobotError, match=r"no robot answered within 3 s|the robot has version 0 and does not ask"):
-        HostNeighbour(line, program, 3.0).give(lambda done, total: None)
+        HostNeighbour(line, program, 3.0).send(lambda done, total: None)
     line.write = lambda data: write(data)  # type: ignore[method-assign]
 
     def cut(done: int, total: int) -> None:
         robot.board.bluetooth.on_byte = lambda byte, _cycle: None
 
-    with pytest.raises(RobotError, match=r"the robot fell silent at row 0: what it has stays there"):
-        HostNeighbour(line, program, 5.0).give(cut)
+    with pytest.raises(RobotError, match=r"the robot fell silent at row 0: it keeps the rows that it has"):
+        HostNeighbour(line, program, 5.0).send(cut)
 
 
 class Attacker(HostNeighbour):
@@ -160,12 +160,12 @@ def test_a_robot_with_a_key_takes_only_programs_of_its_key(image, programs):
     cut = Program(5, true.rows[-1:])
     for forged in (of(programs[5]), cut):
         with pytest.raises(RobotError, match=r"does not keep the program after .* tag of the robot's key"):
-            HostNeighbour(line, forged, 4.0).give(lambda done, total: None)
-    assert HostNeighbour(line, true, 4.0).give(lambda done, total: None) is False
+            HostNeighbour(line, forged, 4.0).send(lambda done, total: None)
+    assert HostNeighbour(line, true, 4.0).send(lambda done, total: None) is False
     with pytest.raises(RobotError, match="the robot has version 4 and does not ask for version 3"):
-        Attacker(line, authenticated(Program(3, true.rows), key), 4.0).give(lambda done, total: None)
+        Attacker(line, authenticated(Program(3, true.rows), key), 4.0).send(lambda done, total: None)
     host = HostNeighbour(line, true, 4.0)
-    assert host.give(lambda done, total: None) is False
+    assert host.send(lambda done, total: None) is False
     host.activate()
     run_until_stored(robot, true)
 
