@@ -1,7 +1,6 @@
 """Draw and summarise the convergence of cooperating swarms from the trials of their scenes, for docs/swarm.md.
 
-    python docs/tools/cooperation.py clocks results/clocks [more folders of the same] [--figure
-docs/figures/clocks.png]
+    python docs/tools/cooperation.py clocks results/clocks [FOLDER ...] [--figure docs/figures/clocks.png]
 
 Each curve shows the median of the trials and the bands that contain 50 and 90 % of them. The summary states the time at
 which each trial reached agreement.
@@ -20,7 +19,7 @@ from arena.scene import palette
 from arena.trial.record import Trial, trials_in
 
 SETTLED = {"average": "agreed", "clocks": "agreed", "halt": "together", "leader": "elected", "search": "found"}
-"""Measure of each experiment that is the time of agreement; it is nan if there is no agreement at the end."""
+"""For each experiment, the measure with the time of agreement, which is nan if there is no agreement at the end."""
 LOG = {"apart"}
 
 

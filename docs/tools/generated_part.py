@@ -1,4 +1,4 @@
-"""The part of a page that a script of this folder makes: each such script checks it or, with --write, replaces it."""
+"""The generated part of a page: a script of this folder checks it or, with --write, replaces it."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from pathlib import Path
 
 @dataclass(frozen=True)
 class GeneratedPart:
-    """The text between `begin` and `end`, which are on the page and stay; without `end`, up to the end of the page."""
+    """The text between the marks `begin` and `end`, which stay on the page; without `end`, up to the page's end."""
 
     page: Path
     begin: str

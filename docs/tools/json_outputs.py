@@ -37,7 +37,7 @@ def _section(path: Path) -> Iterator[str]:
 
 
 class _Keys:
-    """The keys of one schema, as rows of a table. Each definition of the schema is shown once."""
+    """The keys of one schema, as rows of a table. The keys of each definition are shown only once."""
 
     def __init__(self, schema: Any) -> None:
         self._definitions: Final = schema.get("$defs", {})

@@ -1,4 +1,4 @@
-"""Kernel reference from the headers: one anchor per call, with its contract as a table.
+"""Make the kernel reference from the headers: one anchor per call, with its contract as a table.
 
 The contract is the comment above a call: callers, blocking, worst-case Tcy, stack bytes, error codes and description
 (openswarm.h explains it). Calls without a comment of their own share that of the call above.

@@ -1,9 +1,9 @@
-"""Write what a port consists of and touches into docs/porting.md, or check it (exit status 1 if it is out of date).
+"""Write the tables of a port's files into docs/porting.md, or check them (exit status 1 if they are out of date).
 
     python docs/tools/port_files.py [--write]
 
-The first table has the lines of each file of a port, without blanks and lines of comment. The second has the
-files elsewhere that name the newest port, its board or its compiler: what a new port changes as well.
+The first table has the number of lines of each file of a port, without blank lines and comment lines. The second lists
+the files elsewhere that name the newest port, its board or its compiler. A new port must change these files as well.
 """
 
 from __future__ import annotations

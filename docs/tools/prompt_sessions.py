@@ -1,4 +1,4 @@
-"""Record a session of the debugger's prompt as docs/figures/swarm-session.svg.
+"""Record a session at the debugger's prompt as the picture docs/figures/swarm-session.svg.
 
 Usage: `python docs/tools/prompt_sessions.py`. `arena debug` runs on a pseudo terminal, and each line is sent when the
 prompt appears. The terminal type is `dumb`, so that no line is redrawn.

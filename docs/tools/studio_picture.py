@@ -27,7 +27,7 @@ SHOWN_MS: Final = 3000
 """Virtual time of the browser in ms, in which the page fetches and shows the state of the robot."""
 
 
-def ready(studio: Studio) -> None:
+def run_to_breakpoint(studio: Studio) -> None:
     """Run the trial for forty seconds, then until the robot reaches the breakpoint."""
     studio.ask("step", QUANTA)
     while studio.ask("status")["state"] != "paused":
@@ -50,7 +50,7 @@ def main() -> None:
     plan = plan_from(command.parser().parse_args(WORDS), 1)
     studio = Studio(plan, plan.seed)
     try:
-        ready(studio)
+        run_to_breakpoint(studio)
         with command.server(studio, 0) as serving, tempfile.TemporaryDirectory() as profile:
             threading.Thread(target=serving.serve_forever, daemon=True).start()
             words = [browser, "--headless", "--no-sandbox", "--disable-gpu", "--hide-scrollbars",

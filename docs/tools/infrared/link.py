@@ -120,16 +120,19 @@ def _bytes(machine: Machine, name: str, size: int) -> bytes:
 
 
 def facing(distance: float, turned: float = 0.0) -> Poses:
-    """Return poses of two robots: the first's right sensor faces the second's left one, and the second is turned by
-    degrees."""
+    """Return poses of two robots: the first's right sensor faces the second's left one.
+
+    The second robot is turned by `turned` degrees.
+    """
     return Poses([(150.0, 150.0, math.pi / 2), (150.0 + distance, 150.0, math.pi / 2 + math.radians(turned))], [])
 
 
 class Expected(NamedTuple):
     """Expected errors of a receiver that has found the preamble.
 
-    `repaired` is the number of repaired bits per bit of intact frames; `low` and `high` are those of the phases at 10
-    and 90 %. `intact` is the share of intact frames, `ideal` the bit error rate without transitions of light."""
+    `repaired` is the number of repaired bits per bit of intact frames; `low` and `high` are its 10 and 90 % quantiles
+    over the phases. `intact` is the share of intact frames, `ideal` the bit error rate without transitions of light.
+    """
 
     repaired: float
     low: float
@@ -141,9 +144,10 @@ class Expected(NamedTuple):
 def expected(distance: float, noise: float) -> Expected:
     """Return the expected errors between robots that face each other with one emitter and one sensor.
 
-    A bit is decided by three scans, weighted 1-2-1, against half the amplitude of one emitter. After a transition,
-    which half of the bits have, the receiver is still settling in the first scan. How much depends on the phase between
-    the scans of both robots, which is random and lasts for the frame."""
+    The receiver compares three scans, weighted 1-2-1, with half the amplitude of one emitter. Half of the bits begin
+    with a transition, and the receiver is then still settling in the first scan. The error depends on the phase between
+    the scans of both robots, which is random but constant in a frame.
+    """
     scene = load_scene("clustering").infrared
     counts, deviation = amplitude(distance) / brightest(scene.emitter_power), noise * math.sqrt(6) / 4
     ideal = _tail(counts / 2 / deviation)

@@ -116,8 +116,10 @@ def draw_throughput(axes: Any, runs: list[tuple[Job, LinkResult]], data: Path, r
 
 
 def draw_angle(axes: Any, runs: list[tuple[Job, LinkResult]]) -> None:
-    """Draw the share of received frames over the bearing of the light: a robot that is turned by 90 degrees receives
-    on its left."""
+    """Draw the share of received frames over the bearing of the light.
+
+    A robot that is turned by 90 degrees receives on its left.
+    """
     cm = next(job.distance for job, _ in runs if job.turned)
     alone = [(job.turned, one.share) for job, one in runs if (job.senders, job.distance) == (1, cm)]
     found = sorted(((270 + turned) % 360, share) for turned, share in alone)

@@ -29,9 +29,11 @@ SPACING_CM = 11.0
 ROW = 6
 """Maximum number of robots in a row of the grid."""
 REACH_COUNTS = 8.0
-"""Counts of light from another robot's emitters at which that robot is in reach. They correspond to about 27 cm between
-a sensor and an emitter that face each other. At this distance most frames of two undisturbed robots still arrive
-(docs/tools/infrared/link.py)."""
+"""Counts of light from another robot's emitters at which that robot is in reach.
+
+They correspond to about 27 cm between a sensor and an emitter that face each other. At this distance most frames of two
+undisturbed robots still arrive (docs/tools/infrared/link.py).
+"""
 SELECTOR = 6
 """Selector of apps/chatter: a message every 0.75 to 2.25 s."""
 SENDERS, ENTRY = 30, "<5Hih"

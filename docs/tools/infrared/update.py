@@ -68,14 +68,16 @@ def build_image(folder: Path, rows: int) -> Path:
     return out / "firmware.elf"
 
 
-def calls_it(machine: Machine) -> bool:
+def is_program_installed(machine: Machine) -> bool:
     """Whether the program is in the flash slot from which the kernel calls it."""
     return machine.program.word(SLOT.start) != ERASED
 
 
 def measure(image: Path, robots: int, lost: float, most: float, noise: float) -> tuple[list[float], list[float]]:
-    """Return the seconds after which each robot has the program, and after which it calls it. Robots that do not are
-    missing in the unordered lists."""
+    """Return two unordered lists: the seconds after which robots have the program, and after which they call it.
+
+    Robots that have not reached that state in `most` seconds are missing in the list.
+    """
     poses = grid(robots)
     values = {"robots__count": robots, "objects__count": 0, "infrared__noise_counts": noise,
               "infrared__lost_share": lost}  # fmt: skip
@@ -92,7 +94,7 @@ def measure(image: Path, robots: int, lost: float, most: float, noise: float) ->
         for one, controller in enumerate(controllers):
             if word(controller.machine, "have") == VERSION:
                 has.setdefault(one, seconds)
-            if one in has and calls_it(controller.machine):
+            if one in has and is_program_installed(controller.machine):
                 calls.setdefault(one, seconds)
         if len(calls) == robots or seconds >= most:
             break
