@@ -7,13 +7,14 @@ handlers. A request at any time is what the bounds assume, so no measurement may
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from random import Random
 
 import emu
 from bench.structures import Structures
+from emu.boards.epuck.config import CHIPS
 from emu.system.events import NEVER
 from toolchain.bounds.interference import SECOND_STACK
 from toolchain.bounds.program import Program
@@ -97,9 +98,9 @@ class Observer:
     """Runs an image by single instructions and observes W15."""
 
     def __init__(self, image: Path, program: Program) -> None:
-        self.machine = emu.load(image, engine="plain")
-        assert self.machine.run(until="main", seconds=1).reason == "until"
         self.program = program
+        self.machine = emu.load(image, engine="plain", board="epuck" if program.chip.name in CHIPS else "none")
+        self.start = self._run_to_start()
         self.threads = {entry: program.calls.name(entry).removeprefix("_") for entry in program.threads()}
         self.handlers = {entry: (name, level) for entry, name, level in program.interrupts()}
         self.requests = self._requests()
@@ -111,7 +112,7 @@ class Observer:
         """By stack and CPU priority."""
         self._rare = {entry: name for name in RARE if (entry := program.address(name)) in program.calls.entries}
         self._structures = Structures(self.machine) if program.address("_os_ring") is not None else None
-        self._begin("main")
+        self._begin(self.start)
         for annotation in program.annotations.of("stack"):
             name, _, text = annotation.text.partition(" ")
             start, size = program.address(name, annotation), program.annotations.number(text, annotation)
@@ -119,6 +120,13 @@ class Observer:
             assert size is not None
             self.stacks.append(_Stack(SECOND_STACK, start, start + size))
         self._since = self._state()
+
+    def _run_to_start(self) -> str:
+        """Run the start-up code; return the name of main, or without it, of the first C function from reset."""
+        main = self.program.address("main")
+        first = set(self.program.signatures.functions) if main is None else {main}
+        assert self.machine.run(until=lambda: self.machine.pc in first, seconds=1).reason == "until"
+        return self.program.calls.name(self.machine.pc).removeprefix("_")
 
     def _requests(self) -> dict[int, tuple[int, tuple[str, int], tuple[str, int]]]:
         """Return level, flag and enable bit of one vector of each handler of an interrupt, by handler."""
@@ -181,8 +189,8 @@ class Observer:
         before = machine.pc, machine.w[15]
         if machine.service_boundary(NEVER) is not None:
             return False
-        if machine.pc != before[0] and machine.pc in self.handlers:
-            self._enter(before[1])
+        for handler, top in self._accepted(before[1]):
+            self._enter(handler, top)
         self._record()
         if machine.step() is not None:
             return False
@@ -194,11 +202,23 @@ class Observer:
         self._leave()
         return True
 
+    def _accepted(self, top: int) -> Iterator[tuple[int, int]]:
+        """Yield handler and interrupted W15 of each exception of a boundary; a second one interrupts the first's entry.
+
+        `top` is W15 before the boundary.
+        """
+        machine = self.machine
+        for at in range(top, machine.w[15], RETURN_ADDRESS):
+            inner = at + RETURN_ADDRESS
+            pc = machine.pc if inner == machine.w[15] else machine.peek(inner) | (machine.peek(inner + 2) & 0x7F) << 16
+            if pc in self.handlers:
+                yield pc, at
+
     def _begin(self, name: str) -> None:
         """Begin the stack of a thread at its first instruction; it replaces those that used the memory before."""
         start, end = self.machine.w[15] - RETURN_ADDRESS, self.machine.peek("SPLIM") + 2
         self.stacks = [one for one in self.stacks if one.end <= start or one.start >= end]
-        self.stacks.append(_Stack(name, start, end, has_limit=name != "main"))
+        self.stacks.append(_Stack(name, start, end, has_limit=name != self.start))
 
     def _record(self) -> None:
         top = self.machine.w[15]
@@ -225,12 +245,12 @@ class Observer:
             return None
         return stack
 
-    def _enter(self, top: int) -> None:
+    def _enter(self, handler: int, top: int) -> None:
         self._open = [(name, at, start, False) for name, at, start, _ in self._open]
         stack = self._stack_of(top)
         if stack is not None and stack.interrupted is None:
             stack.interrupted = top
-        name, level = self.handlers[self.machine.pc]
+        name, level = self.handlers[handler]
         if level > SWITCH_LEVEL:
             self._measure_lists()
             self._open.append((name, top, self.machine.cycle, True))

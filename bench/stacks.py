@@ -1,11 +1,11 @@
 """Compare bounds of every stack and interrupt handler of applications with what they use in a run: one table.
 
-`python -m bench.stacks [--app NAME] [--cycles N] [--json]`. The run begins with main; stack_observer.py observes W15 at
-every instruction. It feeds both UARTs, delays interrupts, and requests them in the deepest moment of every stack.
-Stacks are those of main, of every thread and of the kernel; "alone" excludes what interrupts use of them. The cycles of
-a handler count if it is neither interrupted nor leads to another thread; its bound assumes the greatest lengths of the
-kernel's lists in the run. Bounds exclude refused messages and SYS_DSP threads if the run had none (`--without`). Exit
-status 1 if a measurement exceeds its bound.
+`python -m bench.stacks [--app NAME] [--cycles N] [--json]`. The run begins with main, or without it with the first C
+function; stack_observer.py observes W15 at every instruction. It feeds both UARTs, delays interrupts, and requests them
+in the deepest moment of every stack. Stacks are those of main, of every thread and of the kernel; "alone" excludes what
+interrupts use of them. The cycles of a handler count if it is neither interrupted nor leads to another thread; its
+bound assumes the greatest lengths of the kernel's lists in the run. Bounds exclude refused messages and SYS_DSP threads
+if the run had none (`--without`). Exit status 1 if a measurement exceeds its bound.
 """
 
 from __future__ import annotations
@@ -56,11 +56,11 @@ class StackRow:
         return self.bound is not None and self.seen > self.bound
 
 
-def _stacks(report: BoundsReport) -> dict[str, int | None]:
-    """Return the bounds of all stacks of a report by the names of rows."""
-    found: dict[str, int | None] = dict(report.stacks)
+def _stacks(report: BoundsReport, start: str) -> dict[str, int | None]:
+    """Return the bounds of all stacks of a report by the names of rows; `start` is the function a run begins with."""
+    found: dict[str, int | None] = {start: None} | report.stacks
     for user in report.rows:
-        if user.name in report.stacks:
+        if user.name in found:
             found[f"{user.name} alone"] = RETURN_ADDRESS + user.bytes if user.stack_is_known else None
     return found
 
@@ -73,7 +73,7 @@ def rows_of(app: str, image: Path, cycles: int, values: Mapping[str, int] = VALU
     observer.run(cycles)
     seen = observer.nest()
     absent = [name for name in RARE if program.address(name) in program.calls.entries and name not in seen.called]
-    bounds = _stacks(report_of(Program(executable, values, absent), ["main"]))
+    bounds = _stacks(report_of(Program(executable, values, absent), [observer.start]), observer.start)
     used = seen.stacks | {f"{name} alone": most for name, most in seen.alone.items()}
     rows = [StackRow(app, name, "bytes", bound, used[name]) for name, bound in bounds.items() if name in used]
     handlers = BoundAnalysis(Program(executable, {**values, **seen.sizes}, absent))

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+import emu
 from bench.stack_observer import RETURN_ADDRESS, Observer
 from bench.stacks import StackRow, rows_of, table
 from tests.firmware.conftest import Build, image
@@ -24,6 +25,38 @@ CYCLES = 900_000
 """Long enough for the first line of listing1's log."""
 SHORT = 200_000
 """Long enough for the first message of hello."""
+
+TWO_TIMERS = """
+#include <xc.h>
+volatile int handled;
+void __attribute__((interrupt, no_auto_psv)) _T1Interrupt(void) { IFS0bits.T1IF = 0; handled++; }
+void __attribute__((interrupt, no_auto_psv)) _T2Interrupt(void) { IFS0bits.T2IF = 0; handled++; }
+int main(void)
+{
+    PR1 = 150;
+    PR2 = 151;
+    IPC0bits.T1IP = 4;
+    IPC1bits.T2IP = 5;
+    T1CON = T2CON = 0x8000;
+    IEC0bits.T1IE = 1;
+    IEC0bits.T2IE = 1;
+    for (;;) {
+    }
+}
+"""
+"""Timers of nearly equal periods: each interrupt occurs at every distance from the other."""
+
+RESET = """
+    .text
+    .global __reset
+__reset:
+    mov #0x900, w15
+    mov #0xA00, w0
+    mov w0, SPLIM
+    nop
+    bra _load
+"""
+"""Start-up code of a program without main."""
 
 __all__ = ["image"]
 
@@ -76,6 +109,26 @@ def test_interrupts_requested_in_the_deepest_moments_reach_nested_stacks(
     planted = report_of(program_of(path), ["main"]).stacks["greet"]
     assert planted is not None
     assert plain["greet"] <= planted < nested["greet"]
+
+
+def test_an_interrupt_of_the_entry_of_a_handler_is_measured(tmp_path: Path) -> None:
+    """A handler that interrupts another one's entry ends where it returns to that entry, not at the end of both."""
+    source, path = tmp_path / "timers.c", tmp_path / "timers.elf"
+    source.write_text(TWO_TIMERS)
+    emu.build(source, output=path, flags=("-Os", "-g"))
+    rows = {row.name: row for row in rows_of("timers", path, 60_000)}
+    assert not [row for row in rows.values() if row.is_exceeded]
+    assert rows["__T1Interrupt"].seen == rows["__T2Interrupt"].seen == rows["__T1Interrupt"].bound
+
+
+def test_code_without_main_is_measured_from_its_first_function(tmp_path: Path) -> None:
+    """An image without start-up code and main, such as a boot loader, begins at the first C function after reset."""
+    start, source, path = tmp_path / "start.s", tmp_path / "loader.c", tmp_path / "loader.elf"
+    start.write_text(RESET)
+    source.write_text("volatile int x; void load(void) { int kept[8]; kept[x & 7] = 1; x = kept[x & 3]; for (;;); }\n")
+    emu.build(source, start, output=path, flags=("-Os", "-g", "-nostartfiles", "-Wl,--no-data-init"))
+    (row,) = (row for row in rows_of("loader", path, 5_000) if row.name == "load alone")
+    assert row.seen == row.bound == RETURN_ADDRESS + 16
 
 
 def test_a_row_below_its_measurement_is_exceeded() -> None:
