@@ -29,7 +29,8 @@ FIRMWARE = Path(__file__).resolve().parents[1] / "firmware"
 START = 8
 """Selector position at which the program starts without the remote control (firmware/apps/clustering)."""
 RED = (80, 0, 0)
-WARM_UP = 1.0
+WARM_UP = 200.0
+"""Simulated seconds until the hot regions of native code are compiled again (emu/dspic30f/jit/hot_regions.py)."""
 
 
 def measure(app: str, seconds: float) -> float:

@@ -43,6 +43,7 @@ from emu.dspic30f.jit.environment import (
     STEPS,
 )
 from emu.dspic30f.jit.exit_reasons import BOUNDARY_WORK, DEADLINE, HOOK, INTERPRET, MISS, RETFIE, UNFINISHED
+from emu.dspic30f.jit.hot_regions import SAMPLE_CYCLES, HotRegions
 from emu.dspic30f.jit.machine_layout import (
     MachineLayout,
     machine_layout,
@@ -60,8 +61,8 @@ from emu.system.rules import Rule
 if TYPE_CHECKING:
     from emu.dspic30f.jit.counting import Counting
 
-BLOCK_LEVEL, STEP_LEVEL = 2, 0
-"""LLVM optimisation levels for block code and for exact code."""
+STEP_LEVEL, BLOCK_LEVEL, HOT_LEVEL = 0, 1, 3
+"""LLVM optimisation levels: exact code, block code, block code of hot regions and the dispatch loop."""
 
 WARM_UP: Final = 10_000
 """Cycles after power-on that the first machine of a process interprets, in Tcy.
@@ -109,6 +110,10 @@ class CodeTable:
     """Leaders (entry addresses) of all requested regions."""
     heat: dict[int, int] = field(default_factory=dict)
     """How often each address without code was reached."""
+    hot: HotRegions = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.hot = HotRegions(self.regions)
 
 
 _shared: Final[WeakValueDictionary[object, CodeTable]] = WeakValueDictionary()
@@ -117,12 +122,13 @@ _shared: Final[WeakValueDictionary[object, CodeTable]] = WeakValueDictionary()
 
 @dataclass
 class EngineStatistics:
-    """Counts of native runs, interpreted instructions, cold runs and regions (`emu run --stats`)."""
+    """Counts of native runs, interpreted instructions, cold runs, regions, and hot regions."""
 
     runs: int = 0
     interpreted: int = 0
     cold: int = 0
     regions: int = 0
+    hot: int = 0
 
 
 class JitEngine:
@@ -146,6 +152,8 @@ class JitEngine:
         self.share_group: object = None
         """Machines with equal values share translations. Tests that change translations set a unique object."""
         self._longest = NATIVE_CYCLES
+        self._unsampled = 0
+        """Tcy of native runs since the last sample of `HotRegions`."""
         self._warm_at = 0 if TRANSLATOR in sys.modules else WARM_UP
         self._counting: Counting | None = None
         self._count_key: object = None
@@ -208,6 +216,7 @@ class JitEngine:
         reason = self._native(self._core.record.address, self._env_address)
         self._env[RESUME] = NOWHERE
         self.counts.runs += 1
+        self._sample(state.cycle - start)
         self._after_run(reason, start, limit)
 
     def _after_run(self, reason: int, start: int, limit: int) -> None:
@@ -271,6 +280,7 @@ class JitEngine:
             self.counts.runs += 1
         env[AT_BOUNDARY] = 0
         self.counts.runs += 1
+        self._sample(cycle - start)
         return reason, cycle, limit
 
     def _continue(self, reason: int, cycle: int) -> bool:
@@ -282,6 +292,16 @@ class JitEngine:
             self._env[AT_BOUNDARY] = 0  # the instruction boundary has been processed
             return True
         return False
+
+    def _sample(self, cycles: int) -> None:
+        """Count the Tcy of a native run that has just ended, and compile its region again if it is hot."""
+        self._unsampled += cycles
+        if self._unsampled >= SAMPLE_CYCLES and self._code is not None and self._counting is None:
+            region = self._code.hot.sample(self._u32[self._pc], self._unsampled)
+            self._unsampled = 0
+            if region is not None:
+                self.counts.hot += 1
+                self._compile(self._code, region, exact=False, level=HOT_LEVEL)
 
     def pass_limits(self, period: int, last: int) -> None:
         """Let native code pass limits without returning, as `Engine.pass_limits` specifies."""
@@ -501,7 +521,7 @@ class JitEngine:
 
         counter = None if self._counting is None else self._counting.boundary_counter()
         text = dispatch_text(self._core, 2 * self._words, counter)
-        self._dispatcher = self._at_once(text, BLOCK_LEVEL)
+        self._dispatcher = self._at_once(text, HOT_LEVEL)
         self._dispatch = Call(self._dispatcher.address)
         self._publish_native_handle()
         if self.seconds is None and self._counting is None:
@@ -521,35 +541,39 @@ class JitEngine:
         return decode_for_execution(flash[pc >> 1], second)
 
     def _request(self, code: CodeTable, pc: int) -> None:
-        """Install the region at `pc` from memory or disk, otherwise request it from the compile process."""
-        from emu.dspic30f.jit.translate.function import Translator
-
+        """Find the region at `pc` and install or request its code."""
         region = discover(pc, self._fetch, code.entries, self._hooks)
         code.regions[pc] = region
         if not region.steps:
             return
         code.entries |= region.leaders
         self.counts.regions += 1
-        filters = code.layout.filters
-        hooked = [(pc, filters[pc]) if pc in filters else pc for pc in sorted(code.layout.hooks & region.steps.keys())]
-        counting = self._counting
-        counted = counting.identity(region) if counting is not None else None
-        identity = repr((region.words(), sorted(region.leaders), pc, hooked, counted)).encode()
         for exact, level in ((True, STEP_LEVEL), (False, BLOCK_LEVEL)):
-            if counting is not None and counting.is_exact and not exact:
-                continue
-            key = self.compiler.key(level, b"exact" if exact else b"block", code.identity, identity)
+            if self._counting is None or exact or not self._counting.is_exact:
+                self._compile(code, region, exact, level)
+
+    def _compile(self, code: CodeTable, region: Region, exact: bool, level: int) -> None:
+        """Install code of a region, at `level` or better, or request it from the compile process."""
+        from emu.dspic30f.jit.translate.function import Translator
+
+        filters, counting = code.layout.filters, self._counting
+        hooked = [(pc, filters[pc]) if pc in filters else pc for pc in sorted(code.layout.hooks & region.steps.keys())]
+        counted = counting.identity(region) if counting is not None else None
+        identity = repr((region.words(), sorted(region.leaders), region.start, hooked, counted)).encode()
+        kind = b"exact" if exact else b"block"
+        keys = {each: self.compiler.key(each, kind, code.identity, identity) for each in (HOT_LEVEL, level)}
+        for each, key in keys.items():
             known = self.compiler.lookup(key)
             if known is not None:
-                self._install((code, exact), known)
-                continue
-            counter = counting.counter() if counting is not None else None
-            translator = Translator(region, code.layout, code.context, exact, counter)
-            text, entries = translator.text(), translator.entries
-            if self.wait:
-                self._install((code, exact), self.compiler.compile_now(text, level, key, entries))
-            else:
-                self.compiler.request(text, level, key, entries, (code, exact))
+                self._install((code, exact, each), known)
+                return
+        counter = counting.counter() if counting is not None else None
+        translator = Translator(region, code.layout, code.context, exact, counter)
+        text, entries = translator.text(), translator.entries
+        if self.wait:
+            self._install((code, exact, level), self.compiler.compile_now(text, level, keys[level], entries))
+        else:
+            self.compiler.request(text, level, keys[level], entries, (code, exact, level))
 
     def _collect(self) -> None:
         """Install all code that the compile process has finished, for any machine, and send it the next request."""
@@ -557,11 +581,11 @@ class JitEngine:
             self._install(tag, loaded)
 
     def _install(self, tag: Any, loaded: LoadedCode) -> None:
-        code, exact = tag
+        code, exact, level = tag
         code.loaded.append(loaded)
         table = code.steps if exact else code.blocks
         for pc in loaded.entries:
-            if not table[pc >> 1]:
+            if level == HOT_LEVEL or not table[pc >> 1]:
                 table[pc >> 1] = loaded.address
 
     def _flash_changed(self, start: int, end: int) -> None:

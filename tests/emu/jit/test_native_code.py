@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import random
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
+from emu.dspic30f.jit import engine as jit_engine
+from emu.dspic30f.jit import hot_regions
 from emu.dspic30f.jit.cache import ObjectCache
 from emu.dspic30f.jit.engine import JitEngine
 from emu.machine.machine import Machine
@@ -287,6 +290,40 @@ def test_registers_of_a_module_that_goes_off_and_on_are_its_own_again() -> None:
     for length in (*range(1, 60), 997, 5003):
         assert plain.run(length) == native.run(length)
         assert not difference(plain, native)
+
+
+@pytest.mark.parametrize("wait", [True, False])
+def test_a_region_that_runs_long_is_compiled_again_and_replaced(
+    wait: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Code of a hot region, from this process or the compile process, replaces the first code; the state is the same.
+    Another machine with the program starts with the better code."""
+    monkeypatch.setenv("OPENSWARM_CACHE", str(tmp_path))
+    monkeypatch.setattr(hot_regions, "HOT_CYCLES", 3_000)
+    monkeypatch.setattr(jit_engine, "SAMPLE_CYCLES", 100)
+    plain, native = pair(counting_firmware())
+    native.runner.wait = wait
+    first: dict[int, int] = {}
+    replaced: set[int] = set()
+    for _ in range(2_000):
+        assert plain.run(1_000) == native.run(1_000)
+        now = {word: address for word, address in enumerate(native.runner._code.blocks) if address}
+        replaced = {word for word, address in first.items() if now[word] != address}
+        if replaced:
+            break
+        first |= now
+        if native.runner.compiler.busy:
+            time.sleep(0.01)
+    assert not difference(plain, native)
+    assert replaced
+    assert native.runner.counts.hot
+    another = eager()
+    another.runner.share_group = object()
+    load(another, counting_firmware())
+    another.run(3_000)
+    if wait:  # otherwise the regions depend on when code arrives
+        assert all(another.runner._code.blocks[word] == now[word] for word in replaced)
+    assert not difference(plain, native)
 
 
 def test_machines_with_one_program_share_what_was_translated() -> None:

@@ -20,7 +20,7 @@ from emu.chips.dspic30f6014a import DSPIC30F6014A
 from emu.dspic30f.exceptions.faults import DebuggerWord, IllegalOpcode
 from emu.dspic30f.isa.flow import Branch, Return, Skip, Sleep
 from emu.dspic30f.jit.compiler import Compiler, LoadedCode
-from emu.dspic30f.jit.engine import JitEngine
+from emu.dspic30f.jit.engine import BLOCK_LEVEL, HOT_LEVEL, STEP_LEVEL, JitEngine
 from emu.dspic30f.jit.worker import Backend
 from emu.dspic30f.state.state import DA, NOT_REPEATING, RA
 from emu.machine.machine import Machine
@@ -139,7 +139,7 @@ class QuickCompiler(Compiler):
         if not entries:
             code = self.dispatchers.get(text) or self.dispatchers.setdefault(text, self.backend.compile(text, level))
             return self.load(code, key, ())
-        return super().compile_now(text, min(level, self._block_level), key, entries)
+        return super().compile_now(text, self._block_level if level else STEP_LEVEL, key, entries)
 
 
 class InstructionObserver:
@@ -307,7 +307,7 @@ def check_straight(seed: int, shape: Shape | None = None) -> Tally:
     """Check a long straight program in block code and exact code, then in exact code alone."""
     firmware = straight_firmware(seed, shape)
     generator = random.Random(seed)
-    plain, native = engine_pair(firmware, seed & 1, 2 if seed % 32 == 5 else 0)
+    plain, native = engine_pair(firmware, seed & 1, {5: HOT_LEVEL, 21: BLOCK_LEVEL}.get(seed % 32, STEP_LEVEL))
     watch, runner = InstructionObserver(plain, native), native.runner
     assert isinstance(runner, JitEngine)
     hooks = Hooks((plain, native), range(BODY, firmware.end, 2), generator) if seed % 3 == 0 else None

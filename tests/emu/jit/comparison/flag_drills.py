@@ -21,7 +21,7 @@ from emu.dspic30f.isa import codec
 from emu.dspic30f.isa.fields import Operands
 from emu.dspic30f.isa.row import Insn, Row
 from emu.dspic30f.isa.table import ROWS
-from emu.dspic30f.jit.engine import JitEngine
+from emu.dspic30f.jit.engine import BLOCK_LEVEL, HOT_LEVEL, STEP_LEVEL, JitEngine
 from emu.machine.machine import Machine
 from tests.emu.jit.comparison.engine_pair import QuickCompiler
 from tests.emu.jit.comparison.random_firmware import difference, words_of
@@ -272,7 +272,7 @@ def check(seed: int, tally: Tally, rounds: int = 16) -> str | None:
             machine.hook_pc(address, lambda m=machine, s=seen: s.append((m.pc, m.cycle)))  # type: ignore[misc]
         if isinstance(machine.runner, JitEngine):
             machine.runner.threshold, machine.runner.wait = 1, True
-            machine.runner.compiler = QuickCompiler(2 if seed % 4 == 1 else 0)
+            machine.runner.compiler = QuickCompiler({1: HOT_LEVEL, 5: BLOCK_LEVEL}.get(seed % 8, STEP_LEVEL))
     native, executed = machines[-1].runner, machines[0].core.sequencer.execute
     assert isinstance(native, JitEngine)
 

@@ -11,7 +11,7 @@ import ctypes
 import random
 from typing import Any, Final
 
-from emu.dspic30f.jit.engine import JitEngine
+from emu.dspic30f.jit.engine import BLOCK_LEVEL, HOT_LEVEL, JitEngine
 from emu.dspic30f.jit.environment import ENV_WORDS
 from emu.dspic30f.jit.ir.values import Number
 from emu.dspic30f.jit.translate import function
@@ -88,12 +88,12 @@ class CountedExact:
         return self.python + int(self._runner._env[EXECUTED])
 
 
-def native_machine(ipl_slip: int) -> Machine:
-    """Return a machine that compiles an address at the second arrival, before it runs it."""
+def native_machine(ipl_slip: int, level: int) -> Machine:
+    """Return a machine that compiles an address at the second arrival, before it runs it; `level` is that of blocks."""
     machine = Machine(engine="jit", ipl_slip=ipl_slip)
     runner = machine.runner
     assert isinstance(runner, JitEngine)
-    runner.threshold, runner.wait, runner.compiler = 2, True, QuickCompiler(2)
+    runner.threshold, runner.wait, runner.compiler = 2, True, QuickCompiler(level)
     return machine
 
 
@@ -103,7 +103,8 @@ def check_long(seed: int, instructions: int, share: float = 0.003) -> Tally:
     shape = Shape(instructions=300, periods=(1500, 9000), loops=(20, 300), calm=True)
     firmware = straight_firmware(seed, shape)
     generator = random.Random(seed)
-    blocks, exact = native_machine(seed & 1), native_machine(seed & 1)
+    level = HOT_LEVEL if seed & 2 else BLOCK_LEVEL
+    blocks, exact = native_machine(seed & 1, level), native_machine(seed & 1, level)
     interpreted = Machine(engine="plain", ipl_slip=seed & 1)
     count = CountedExact(exact)
     interpreter = CountedInterpreter(interpreted)

@@ -21,7 +21,7 @@ import numpy as np
 from emu.boards.epuck.board import Epuck
 from emu.chips.chip import Chip
 from emu.chips.dspic30f6014a import DSPIC30F6014A
-from emu.dspic30f.jit.engine import JitEngine
+from emu.dspic30f.jit.engine import BLOCK_LEVEL, HOT_LEVEL, STEP_LEVEL, JitEngine
 from emu.machine.machine import Machine
 from emu.machine.stops import Stop
 from emu.peripherals.i2c.bus import I2cDevice
@@ -369,7 +369,7 @@ def subject(seed: int, engine: str, stretches: dict[int, list[int]], chip: Chip 
     made = Subject(machine)
     if isinstance(machine.runner, JitEngine):
         machine.runner.threshold, machine.runner.wait = 1, True
-        machine.runner.compiler = QuickCompiler(2 if seed % 16 == 5 else 0)
+        machine.runner.compiler = QuickCompiler({5: HOT_LEVEL, 21: BLOCK_LEVEL}.get(seed % 32, STEP_LEVEL))
     machine.stop_on_fault = False
     if draw.random() < 0.9:
         machine.program.put(0xF80002, 0x7FFF)  # FWDT: no watchdog
