@@ -55,6 +55,22 @@ class Difference:
         return "\n".join(lines)
 
 
+def executions(
+    program: Program, sizes: Sizes, base: int, seen: list[Record]
+) -> Iterator[tuple[Executor, list[Record]]]:
+    """Yield the model's executions that may explain the records `seen`, each with its records.
+
+    They differ in where the interrupt within a call comes: at each of the model's boundaries between the two records of
+    `seen` between which the interrupt came. base: heap bytes in use when the program starts.
+    """
+    came = next(((n, record[8]) for n, record in enumerate(seen) if record[0] == LATER_ISR), (-1, 0))
+    for boundary in range(MOST_BOUNDARIES):
+        executor = Executor(program, sizes, (*came, boundary))
+        yield executor, executor.run(base)
+        if not executor.later_came:
+            break
+
+
 class Kernels:
     """The interpreter on the POSIX port."""
 
@@ -83,15 +99,10 @@ class Kernels:
 
     def difference(self, program: Program, status: int, records: bytes) -> Difference | None:
         """Return how the kernel's records of a program differ from the model's."""
-        seen = list(RECORD.iter_unpack(records))
-        came = next(((n, record[8]) for n, record in enumerate(seen) if record[0] == LATER_ISR), (-1, 0))
-        for boundary in range(MOST_BOUNDARIES):
-            executor = Executor(program, self.sizes, (*came, boundary))
-            wanted = executor.run(self.base)
+        seen, wanted = list(RECORD.iter_unpack(records)), []
+        for _, wanted in executions(program, self.sizes, self.base, seen):
             if status == 0 and wanted == seen:
                 return None
-            if not executor.later_came:
-                break
         return Difference(status, seen, wanted)
 
     def check(self, programs: list[Program]) -> Iterator[Difference | None]:

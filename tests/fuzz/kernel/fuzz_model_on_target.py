@@ -19,6 +19,7 @@ sys.path.insert(0, str(ROOT))
 from firmware.tools.simulated.machine import NotInstalled  # noqa: E402
 from tests.firmware.conftest import TARGET_APPS  # noqa: E402
 from tests.firmware.model import on_target  # noqa: E402
+from tests.firmware.model.compare import random_programs  # noqa: E402
 from tests.firmware.ports.targets import BOARDS, make  # noqa: E402
 from tests.fuzz.seeds import SKIPPED, Campaign, parser  # noqa: E402
 
@@ -51,7 +52,7 @@ def main() -> int:
             machine = machines[target]
             if machine is None:
                 continue
-            for program in on_target.small_programs(seed, PROGRAMS):
+            for program in random_programs(seed, PROGRAMS):
                 try:
                     difference = machine.difference(program)
                 except AssertionError as error:

@@ -4,18 +4,43 @@
 
 volatile uint16 port_sizes[SIZES]; /* for the test */
 volatile uint8 program[600];
+static uint8 skipped_allocations, failing_allocations;
+static uint8 unlocks_left; /* until isr_at_unlock; 0: none is wanted */
+static void (*isr_at_unlock)(void);
 
 void machine_init(void);
 
-/* Programs for a robot call neither of these. */
-void machine_interrupt_at_unlock(uint8 n, void (*wanted)(void))
+bool machine_allocation_fails(void)
 {
-    (void)n, (void)wanted;
+    if (skipped_allocations != 0) {
+        skipped_allocations--;
+        return false;
+    }
+    return failing_allocations != 0 && failing_allocations-- != 0;
 }
 
 void machine_fail(uint8 skip, uint8 count)
 {
-    (void)skip, (void)count;
+    skipped_allocations = skip;
+    failing_allocations = count;
+}
+
+/* Instead of the port's hal_unlock() (within_calls.h). */
+HAL_OUTLINE void machine_unlock(hal_lock_state before)
+{
+    (hal_unlock)(before);
+    hal_lock_state lock = hal_lock_devices();
+    bool is_last = unlocks_left != 0 && --unlocks_left == 0;
+    (hal_unlock)(lock);
+    if (is_last) {
+        machine_interrupt(isr_at_unlock);
+    }
+}
+
+void machine_interrupt_at_unlock(uint8 n, void (*isr)(void))
+{
+    isr_at_unlock = isr;
+    unlocks_left = n;
 }
 
 HAL_OUTLINE void machine_ready(void) /* the test writes the program here */

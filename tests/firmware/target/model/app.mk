@@ -1,0 +1,1 @@
+override DEFINES += -include $(APPS)/$(APP)/within_calls.h
