@@ -19,6 +19,8 @@ Place = tuple[float, ...]
 """Position x, y in cm; of a movable polygon also its heading in rad."""
 ROUNDING_CM: Final = 1e-9
 """Rounding of distances: bodies may touch, as on a lattice with gaps of their diameter."""
+OVERLAP_CM: Final = 0.5
+"""Accepted overlap of bodies with poses in [start]. Bodies that robots push together overlap by about 0.1 cm."""
 TRIES: Final = 2000
 """Random positions to try before the scene counts as full."""
 
@@ -46,7 +48,7 @@ def place_all(scene: Scene, rng: np.random.Generator) -> tuple[list[tuple[float,
     """Return the poses of the robots (x, y in cm, heading in rad) and the positions of the objects, without contacts.
 
     Poses in [start] are returned as they are, with contacts. Raises SceneError if there is no room: too few marks,
-    marks too near each other or to a wall, or a pose outside the walls.
+    marks too near each other or to a wall, or bodies in [start] that overlap.
     """
     if scene.start.robot_poses or scene.start.object_poses:
         return _start_poses(scene)
@@ -71,15 +73,55 @@ def place_all(scene: Scene, rng: np.random.Generator) -> tuple[list[tuple[float,
 
 
 def _start_poses(scene: Scene) -> tuple[list[tuple[float, float, float]], list[Place]]:
-    """Return the poses of robots and objects in [start]. Raises SceneError for one outside the walls."""
-    arena = scene.arena
-    for key, poses in (("robot_poses", scene.start.robot_poses), ("object_poses", scene.start.object_poses)):
-        for x, y, *_ in poses:
-            inside = 0 < x < arena.width_cm and 0 < y < arena.height_cm
-            if not inside or (arena.polygon and not geometry.contains(arena.polygon, x, y)):
-                raise SceneError(f"{scene.name}: start.{key}: ({x:g}, {y:g}) cm is outside the walls")
+    """Return the poses of robots and objects in [start]. Raises SceneError for a body in a wall or in another body."""
     robots = [(x, y, math.radians(degrees)) for x, y, degrees in scene.start.robot_poses]
-    return robots, [(*pose[:2], *map(math.radians, pose[2:])) for pose in scene.start.object_poses]
+    objects: list[Place] = [(*pose[:2], *map(math.radians, pose[2:])) for pose in scene.start.object_poses]
+    outlines = outlines_of(scene)
+    taken: list[tuple[float, float, float]] = []
+    shapes: list[tuple[Place, list[tuple[float, float]]]] = []
+    bodies: list[tuple[str, Place, float]] = [
+        ("robot_poses", place, scene.robot_kind(number).radius_cm) for number, place in enumerate(robots)
+    ]
+    for number, place in enumerate(objects):
+        kind = scene.kind_of(number)
+        if kind.polygon:
+            shapes.append((place, geometry.turned(geometry.centred(kind.polygon), *place)))
+        else:
+            bodies.append(("object_poses", place, kind.radius_cm))
+    for key, (x, y, *_), radius in bodies:
+        reach = max(radius - OVERLAP_CM, 0.0)
+        why = obstruction(scene, outlines, taken, x, y, reach)
+        for place, shape in shapes:
+            if not why and (geometry.contains(shape, x, y) or _distance_to(shape, x, y) < reach):
+                why = f"touches what is at ({place[0]:g}, {place[1]:g}) cm"
+        _refuse(scene, key, (x, y), why)
+        taken.append((x, y, radius))
+    for index, (place, shape) in enumerate(shapes):
+        others = [(at, other) for number, (at, other) in enumerate(shapes) if number != index]
+        for corner in shape:
+            x, y = _shifted(corner, place)
+            touched = [at for at, other in others if geometry.contains(other, x, y)]
+            why = f"touches what is at ({touched[0][0]:g}, {touched[0][1]:g}) cm" if touched else ""
+            _refuse(scene, "object_poses", place, why or obstruction(scene, outlines, [], x, y, 0.0))
+    return robots, objects
+
+
+def _refuse(scene: Scene, key: str, place: Place, why: str) -> None:
+    """Raise SceneError for a pose in [start], unless `why` is empty."""
+    if why:
+        raise SceneError(f"{scene.name}: start.{key}: ({place[0]:g}, {place[1]:g}) cm {why}")
+
+
+def _distance_to(shape: list[tuple[float, float]], x: float, y: float) -> float:
+    """Return the distance from a point to the nearest side of a polygon."""
+    return min(geometry.distance_to(x, y, side) for side in geometry.sides(shape))
+
+
+def _shifted(corner: tuple[float, float], centre: Place) -> tuple[float, float]:
+    """Return a corner of a polygon, moved by OVERLAP_CM towards its centre."""
+    dx, dy = centre[0] - corner[0], centre[1] - corner[1]
+    share = min(OVERLAP_CM / math.hypot(dx, dy), 1.0)
+    return corner[0] + share * dx, corner[1] + share * dy
 
 
 def outlines_of(scene: Scene) -> list[geometry.Side]:

@@ -163,7 +163,7 @@ class Start:
       at rest and dark.
     - A robot without a motor step, a LED change or a byte on UART1 for `silent_s` is reported.
     - `robot_poses` and `object_poses` are the poses of all robots and of all objects, instead of those by `place`: x
-      and y in cm, and of robots and polygons the heading in degrees. Bodies may touch each other. `--start RECORD` of
+      and y in cm, and of robots and polygons the heading in degrees. Bodies may overlap by 0.5 cm. `--start RECORD` of
       `arena run` sets those at the end of a recorded trial.
     """
 

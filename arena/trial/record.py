@@ -226,7 +226,7 @@ def read_trial(path: Path) -> Trial:
         table = pq.read_table(pa.BufferReader(read_file(path)) if is_standard(path) else path)
         about = json.loads((table.schema.metadata or {})[b"arena"])
     except (OSError, pa.ArrowException, KeyError, ValueError, RecursionError) as error:
-        raise RecordError(f"{path}: is not a recorded trial: {error}") from None
+        raise RecordError(f"{path}: is not a recorded trial: {' '.join(str(error).split())}") from None
     columns = Columns(path)
     columns.update({name: _values(path, name, table[name]) for name in table.column_names})
     return Trial(path, columns, checked(path, about))

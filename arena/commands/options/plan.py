@@ -92,12 +92,17 @@ def start_at_end_of(scene: Scene, record: Path) -> Scene:
     if not len(trial.times):
         raise RecordError(f"{record}: has no samples, so no poses to start from")
     turned = [trial.columns[f"r{robot}_heading"][-1] for robot in range(trial.scene.robots.count)]
-    robots = [(x, y, math.degrees(heading)) for (x, y), heading in zip(trial.robots[-1].tolist(), turned, strict=True)]
-    objects = [(*pose[:2], *map(math.degrees, pose[2:])) for pose in trial.object_poses[-1]]
+    robots = [(*place, _degrees(rad)) for place, rad in zip(trial.robots[-1].tolist(), turned, strict=True)]
+    objects = [(*pose[:2], *map(_degrees, pose[2:])) for pose in trial.object_poses[-1]]
     try:
         return scene.with_values(start__robot_poses=robots, start__object_poses=objects)
     except SceneError as error:
         raise SceneError(f"--start {record}: {error}") from None
+
+
+def _degrees(heading: float) -> float:
+    """Return a heading in degrees, -180 to 180. Headings of a record count full turns."""
+    return math.degrees(math.remainder(heading, math.tau))
 
 
 def parse_value(text: str) -> bool | int | float | str | list[Any]:
