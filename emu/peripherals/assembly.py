@@ -195,7 +195,10 @@ class Peripherals:
             uart.deliver_sent()
 
     def synchronize(self) -> None:
-        """Process all pending lazy board state, so that the record does not depend on earlier reads."""
+        """Bring all lazily computed state to the present, so that the record does not depend on earlier reads."""
+        self.adc.synchronize()
+        for port in range(len(PORTS)):
+            self.pins.invalidate(port)
         for listener in self.on_synchronize:
             listener()
 

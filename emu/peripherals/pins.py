@@ -319,7 +319,7 @@ class Pins:
 
     def invalidate(self, port: int) -> None:
         """Discard the cached levels of `port`, after its waveforms or the state on which they depend changed."""
-        self.constant_until[port] = 0
+        self.constant_until[port] = self.constant_levels[port] = 0
 
     def set(self, name: str, level: int, cycle: int | None = None) -> None:
         """Drive one pin from outside with `level` (0 or 1) from `cycle` on (default: now)."""
@@ -342,7 +342,7 @@ class Pins:
     def get(self, name: str) -> int:
         """Return the level of one pin in the current cycle, 0 or 1."""
         port, mask = parse_pin(name)
-        return int(bool(self.levels(port, self._events.now) & mask))
+        return int(bool(self._events.peek(lambda: self.levels(port, self._events.now)) & mask))
 
     def levels(self, port: int, cycle: int) -> int:
         """Return the digital levels of a port at `cycle`: the current one; any cycle for waveform pins."""

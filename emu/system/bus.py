@@ -141,7 +141,7 @@ class Bus:
     def peek(self, address: int) -> int:
         """Return the word at the even SFR `address`, without side effects."""
         hook = self.compute[address >> 1]
-        return hook() if hook is not None else self.record.u16[address >> 1]
+        return self.events.peek(hook) if hook is not None else self.record.u16[address >> 1]
 
     def poke(self, address: int, value: int) -> None:
         """Set the stored word at the even SFR `address`, without calling hooks."""

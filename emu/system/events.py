@@ -35,6 +35,8 @@ class Events:
         """Whether an event is being handled; False during an instruction's access or a tool's call."""
         self.quiet = False
         """Whether recorded cycles are replayed; their observers have already been called and are not called again."""
+        self.is_peeking = False
+        """Whether a tool looks at a value. Parts then compute it without a change of their state."""
         self.names: Final[list[str]] = []
         self._fire: Final[list[Callable[[int], None]]] = []
         self.rules: Final[dict[int, Any]] = {}
@@ -52,6 +54,14 @@ class Events:
     @now.setter
     def now(self, cycle: int) -> None:
         self._u64[self._now] = cycle
+
+    def peek(self, compute: Callable[[], int]) -> int:
+        """Return the value that `compute` returns for a tool."""
+        before, self.is_peeking = self.is_peeking, True
+        try:
+            return compute()
+        finally:
+            self.is_peeking = before
 
     @property
     def deadline(self) -> int:

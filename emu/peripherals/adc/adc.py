@@ -387,10 +387,10 @@ class Adc(Peripheral):
         self._plan()
 
     def _read(self, register: Register) -> int:
-        self._catch_up_now()
+        self.synchronize()
         return register.value
 
-    def _catch_up_now(self) -> None:
+    def synchronize(self) -> None:
         """Bring the registers up to the current cycle. The interrupt is requested by its own event."""
         if self._state.value > WAITING:
             self.catch_up(self.now)
@@ -446,7 +446,7 @@ class Adc(Peripheral):
         Return the register's value before the write, in which bits outside `lanes` remain.
         """
         register.value = old
-        self._catch_up_now()
+        self.synchronize()
         left, hardware = register.value, self.con2["BUFS"]
         register.value = left & ~lanes | new & lanes
         self.con2["BUFS"] = hardware

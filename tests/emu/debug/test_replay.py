@@ -47,3 +47,28 @@ def test_replayed_resets_are_no_loop_of_resets() -> None:
     stop = history.advance(10_000)
     assert stop is not None
     assert (stop.reason, stop.cycle, stop.detail) == (expected.reason, expected.cycle, expected.detail)
+
+
+@pytest.mark.parametrize("register", ["ADCBUF0", "ADCON1", "PORTF"])
+def test_a_look_at_a_register_in_the_past_keeps_the_recording(register: str) -> None:
+    """The ADC and the levels of a UART's TX pin are computed at a look, which counted as a change of the machine."""
+    machine = Machine(engine="plain")
+    machine.program.put(0, 0x37FFFF)  # bra to itself
+    machine.reset("POR")
+    machine.write("ADCON3", 0x0102)
+    machine.write("ADCON2", 0x003C)  # an interrupt after 16 results, which come every 23 Tcy
+    machine.write("ADCON1", 0x80E4)
+    machine.write("U1MODE", 0x8000)
+    machine.write("U1STA", 0x0400)
+    history = History(machine)
+    history.advance(1000)
+    expected = machine.snapshot()
+    for cycle in range(100, 300, 10):
+        history.seek(cycle)
+        state = machine.snapshot()
+        machine.peek(register)
+        assert machine.snapshot() == state
+        history.step()
+        assert history.end == 1000
+    history.seek(1000)
+    assert machine.snapshot() == expected

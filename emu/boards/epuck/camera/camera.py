@@ -216,9 +216,26 @@ class Camera(BoardPart, I2cDevice):
     def bits(self, cycle: int) -> int:
         """Return the byte on RD8..RD15 in `cycle`, 0 between lines."""
         u64, first = self._u64, self._line_from.index
-        if not u64[first] <= cycle < u64[self._line_to.index] and not self._render(cycle):
-            return 0
+        if not u64[first] <= cycle < u64[self._line_to.index]:
+            if self.events.is_peeking:
+                return self._peek_byte(cycle) << 8
+            if not self._render(cycle):
+                return 0
         return self._line[(cycle - u64[first]) // u64[self._byte.index]] << 8
+
+    def _peek_byte(self, cycle: int) -> int:
+        """Return the byte on the bus in `cycle` for a tool, and keep the record as it is.
+
+        It is 0 for lines of a computed scene that the firmware has not read yet: its source may draw random numbers.
+        """
+        found = self.scan.line_at(cycle) if self._pixels is self._still else None
+        if found is None:
+            return 0
+        room = (ctypes.c_uint8 * (2 * LINE_PIXELS))()
+        line, href = found
+        self._encode_line(line, href, ctypes.addressof(room))
+        tcy = self.scan.timing.byte_tcy
+        return room[(cycle - href + tcy // 2) // tcy]
 
     def constant_until(self, cycle: int) -> int:
         """Return the start of the next line if `cycle` is between lines; within a line, `cycle` (no guarantee)."""

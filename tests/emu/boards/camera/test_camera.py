@@ -431,6 +431,35 @@ def test_pixel_sources_are_called_for_read_lines_only(robot):
     assert asked[0][2] == robot.board.camera.scan.href(40, 3)
 
 
+def test_a_look_at_the_pixel_bus_asks_no_source_and_changes_nothing(robot):
+    """A source may draw random numbers: a look of a tool would change the rest of the trial."""
+    asked = []
+
+    def pixels(y, columns, cycle):
+        asked.append(y)
+        return np.full((len(columns), 3), 255, np.uint8)
+
+    machine, camera = robot.machine, robot.board.camera
+    robot.configure(po6030())
+    camera.show_pixels(pixels)
+    machine.state.cycle = camera.scan.href(60, 1) + 5
+    robot.at(machine.cycle)
+    before = machine.snapshot()
+    assert machine.peek("PORTD") >> 8 == machine.pins.get("RD15") == 0
+    assert (asked, machine.snapshot()) == ([], before)
+    line = robot.read("PORTD") >> 8
+    assert (len(asked), machine.peek("PORTD") >> 8, line != 0) == (1, line, True)
+
+
+def test_a_look_at_the_pixel_bus_sees_a_still_picture(robot):
+    """The picture of a file has no state: a look gives the byte that an instruction would read."""
+    robot.configure(po6030())
+    robot.board.camera.show(scene())
+    robot.at(robot.board.camera.scan.href(60, 1) + 5)
+    seen = robot.machine.peek("PORTD") >> 8
+    assert seen == robot.read("PORTD") >> 8 != 0
+
+
 def test_frame_is_the_picture_the_sensor_sends(robot):
     """`frame` returns the picture as on the bus, with window, format and gains."""
     picture = scene()
