@@ -80,9 +80,8 @@ def _program_pieces(image: Image, section: Section) -> list[Piece]:
     for symbol, start, end in _cuts(image, section, space):
         named = start + symbol.size if symbol and symbol.size and kind == "const" else end
         shift = section.load_address - section.address
-        first = (
-            start + start % 2
-        )  # constants may begin at odd addresses; a word belongs to the symbol of its first byte
+        # Constants may begin at odd addresses. A word belongs to the symbol of its first byte.
+        first = start + start % 2
         for address in range(first + shift, end + shift, 2):
             line = image.lines.find(address) if kind == "code" else None
             is_named = symbol is not None and address - shift < named  # unnamed strings may follow a named constant

@@ -174,7 +174,7 @@ class Peripheral(Device):
         self.release_pins()
 
     def release_pins(self) -> None:
-        """Return the device's pins to LAT and TRIS. At a chip reset, the ports do this (§6)."""
+        """Release the device's pins to LAT and TRIS. At a chip reset, the ports do this (§6)."""
 
     def before_disable(self) -> None:
         """Prepare the device before PMD clears its registers."""

@@ -225,7 +225,7 @@ class Can(Peripheral):
         self.ctrl["ICODE"] = next(pending, 0)
 
     def release_pins(self) -> None:
-        """Return the CiTX pin to LAT and TRIS."""
+        """Release the CiTX pin to LAT and TRIS."""
         self._tx_port.release(self._tx_pin)
 
     def reset(self, power_on: bool) -> None:

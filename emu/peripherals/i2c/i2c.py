@@ -125,9 +125,8 @@ class I2c(Peripheral):
 
     def _con_written(self, old: int, new: int, _lanes: int) -> None:
         enable = 1 << self.context.chip.sfrs["I2CCON"].fields["I2CEN"][0]
-        if (
-            old & ~new & self._sclrel and not self.con["STREN"]
-        ):  # UNVERIFIED: §11 does not say when software may clear SCLREL
+        # UNVERIFIED: software can clear SCLREL only while STREN is set; §11 does not say when it may.
+        if old & ~new & self._sclrel and not self.con["STREN"]:
             new |= self._sclrel
             self.con.value = new
         if (old ^ new) & enable:
@@ -335,7 +334,7 @@ class I2c(Peripheral):
         self._scl_changed(cycle, 0, self.wire.scl if self.wire.scl_high else 0)
 
     def release_pins(self) -> None:
-        """Return SDA and SCL to LAT and TRIS."""
+        """Release SDA and SCL to LAT and TRIS."""
         self._port.release(self.wire.sda | self.wire.scl)
 
     def reset(self, power_on: bool) -> None:

@@ -277,5 +277,5 @@ class Pwm(Peripheral):
         self._update(cycle)
 
     def release_pins(self) -> None:
-        """Return the outputs to LAT and TRIS."""
+        """Release the outputs to LAT and TRIS."""
         self._update(self.now + 1)

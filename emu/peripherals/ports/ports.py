@@ -85,7 +85,7 @@ class Port(Peripheral):
         self._drive(self.now + 1)
 
     def release_now(self, mask: int) -> None:
-        """Return pins to LAT and TRIS in the current cycle. Events call this."""
+        """Release pins to LAT and TRIS in the current cycle. Events call this."""
         self._owned.value &= ~mask
         self._drive(self.now)
 
@@ -97,14 +97,14 @@ class Port(Peripheral):
         self._drive(self.now)
 
     def drive_now(self, mask: int, owned: int, levels: int, cycle: int) -> None:
-        """From `cycle` on, drive the pins in `owned` with `levels`, and return the others in `mask`."""
+        """From `cycle` on, drive the pins in `owned` with `levels`, and release the others in `mask`."""
         self._owned.value = self._owned.value & ~mask | owned
         self._own_drive.value = self._own_drive.value & ~mask | owned
         self._own_level.value = self._own_level.value & ~mask | levels & owned
         self._drive(cycle)
 
     def release(self, mask: int) -> None:
-        """Return pins to LAT and TRIS from the next cycle on."""
+        """Release pins to LAT and TRIS from the next cycle on."""
         self._owned.value &= ~mask
         self._drive(self.now + 1)
 

@@ -204,7 +204,7 @@ class Dci(Peripheral):
             self._release()
 
     def release_pins(self) -> None:
-        """Return all four pins to LAT and TRIS."""
+        """Release all four pins to LAT and TRIS."""
         self._release()
 
     def _release(self) -> None:

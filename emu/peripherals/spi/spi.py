@@ -238,7 +238,7 @@ class Spi(Peripheral):
         self.events.cancel(self._step)
 
     def release_pins(self) -> None:
-        """Return all pins to LAT and TRIS, because SPIEN is 0."""
+        """Release all pins to LAT and TRIS, because SPIEN is 0."""
         self._take_pins()
 
     def stops_in(self, mode: int) -> bool:

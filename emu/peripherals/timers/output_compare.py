@@ -175,7 +175,7 @@ class Compare(Peripheral):
             self._plan()
 
     def release_pins(self) -> None:
-        """Return the channel's pin to LAT and TRIS."""
+        """Release the channel's pin to LAT and TRIS."""
         self._port.release(self._pin)
 
     def restored(self) -> None:

@@ -464,7 +464,7 @@ class Uart(Peripheral):
         self.sta["RIDLE"] = 1
 
     def release_pins(self) -> None:
-        """Return TX and RX to LAT and TRIS."""
+        """Release TX and RX to LAT and TRIS."""
         self._tx_port.release(self._tx_pin)
         self._rx_port.release(self._rx_pin)
 
