@@ -20,7 +20,7 @@ from toolchain.errors import SourceLocation
 
 LINE_BASE, LINE_RANGE, OPCODE_BASE = -5, 14, 10  # header of line programs of assembly (abi-elf.md §6.7)
 ADDRESS_SIZE = 4
-LANGUAGE = 0x8001  # DW_LANG_Mips_Assembler, which GNU as writes for every assembly source
+LANGUAGE = 0x8001  # DW_LANG_Mips_Assembler, which GNU as writes for assembly of every processor
 PRODUCER = "OpenSwarm assembler"
 _OPCODE_LENGTHS = bytes((0, 1, 1, 1, 1, 0, 0, 0, 1))  # operands of each standard opcode (DWARF 2 §6.2.4)
 _COPY, _ADVANCE_PC, _ADVANCE_LINE, _SET_FILE = 1, 2, 3, 4  # DW_LNS_*, DWARF 2 §7.21

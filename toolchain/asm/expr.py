@@ -17,7 +17,8 @@ MASK64 = 0xFFFF_FFFF_FFFF_FFFF
 MAX_DEPTH = 64  # maximum nesting of parentheses and prefixes; deeper input is an error instead of a stack overflow
 OPERATORS = frozenset(
     ["tbloffset", "tblpage", "psvoffset", "psvpage", "handle", "paddr", "edspage", "edsoffset", "addr_lo", "addr_hi"]
-)  # abi-elf.md §4.2; dmaoffset, boot and secure are operators of other chips and are refused by name
+)
+"""Operators of expressions (abi-elf.md §4.2); `_REFUSED` has those of other chips."""
 _REFUSED = {
     "lo": "lo() is not an operator of this assembler: use & 0xFFFF",
     "hi": "hi() is not an operator of this assembler: use >> 16",
@@ -276,7 +277,8 @@ CONSTANT_OPERATORS: dict[str, Callable[[int], int]] = {
     "paddr": lambda v: v & 0xFFFFFF,
     "addr_lo": lambda v: v & 0xFFFF,
     "addr_hi": lambda v: v >> 16 & 0xFFFF,
-}  # abi-elf.md §4.2; handle() and eds*() of a plain number are errors
+}
+"""Values of operators applied to plain numbers (abi-elf.md §4.2). handle() and eds*() of a plain number are errors."""
 
 
 def distance(a: AsmSymbol, b: AsmSymbol, final: bool) -> int | None:
@@ -296,9 +298,8 @@ def combine(op: str, a: ExprValue, b: ExprValue, final: bool = False) -> ExprVal
     if isinstance(a, int) and isinstance(b, int):
         return wrap(_BINARY[op](a, b))
     if op in "+-":
-        if isinstance(b, int) and isinstance(
-            a, SymbolValue
-        ):  # also for op(x)+n: the addend of a relocation is inside the operator
+        # This holds also for op(x)+n: the addend of a relocation is inside the operator.
+        if isinstance(b, int) and isinstance(a, SymbolValue):
             return SymbolValue(a.add, a.sub, wrap(a.offset + b if op == "+" else a.offset - b), a.op)
         if op == "+" and isinstance(a, int) and isinstance(b, SymbolValue):
             return SymbolValue(b.add, b.sub, wrap(a + b.offset), b.op)

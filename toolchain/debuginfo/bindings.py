@@ -69,10 +69,10 @@ class _RecordFlow:
         self.replaced = self._replaced_records()
 
     def _replaced_records(self) -> dict[int, set[int]]:
-        """The records that each record of a moved value replaces; the middle end has moved the value to a later place.
+        """By record of a moved value: the records that it replaces.
 
         The middle end moves a record with its value, even past a later assignment to the variable. At the old place it
-        leaves a record that computes the value from operands. The moved record is valid only where that one is.
+        leaves a record that computes the value from operands. The moved record is valid only where that record is.
         """
         by_variable: dict[str, list[int]] = {}
         for k, record in enumerate(self.records):
@@ -128,7 +128,7 @@ def _meet(incoming: list[ValidRecords]) -> ValidRecords:
 
 
 def in_memory(f: Function, info: DebugMetadata) -> dict[int, Instr]:
-    """By index of an assignment record after which the whole variable is in memory: the alloca of the variable.
+    """Alloca of the variable, by index of each assignment record after which the whole variable is in memory.
 
     The store linked to the record precedes it, or the object has not been written yet. Variables that are partly in
     registers are excluded.

@@ -57,9 +57,9 @@ def _text(module: Module, v: Value) -> str:
 
 
 def interrupt_kind(notes: set[str], position: str) -> str:
-    """ "" for ordinary functions, else "no_auto_psv" or "auto_psv", with ",shadow" appended (abi-elf.md §2.5).
+    """Return the kind of an interrupt function: "auto_psv" or "no_auto_psv", also with ",shadow"; "" for others.
 
-    Raises UnsupportedError at `position` if a function has both.
+    Source: abi-elf.md §2.5. Raises UnsupportedError at `position` if a function has both attributes.
     """
     words = {w for n in notes for w in n.removeprefix(PREFIX).split(",")} & WORDS
     if not any(n.startswith(PREFIX) for n in notes) and "interrupt" not in words:

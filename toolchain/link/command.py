@@ -38,7 +38,7 @@ _NUMBERS = {"heap": 0xFFFF, "stack": 0xFFFF, "stackguard": 0xFFFF, "fill_upper":
 def add_options(p: argparse.ArgumentParser) -> None:
     """Add the options of the linker, with the names of Microchip's linker (abi-elf.md §3.3)."""
     p.add_argument("-e", "--entry", default="__reset", help="start symbol (default __reset)")
-    p.add_argument("--gc-sections", action="store_true", help="leave out sections nothing refers to")
+    p.add_argument("--gc-sections", action="store_true", help="omit sections to which nothing refers")
     p.add_argument("--no-gc-sections", dest="gc_sections", action="store_false", help=argparse.SUPPRESS)
     p.add_argument("-u", "--undefined", action="append", default=[], metavar="SYM", help="keep and look for SYM")
     p.add_argument("--defsym", action="append", default=[], metavar="NAME=VALUE", help="define an absolute symbol")

@@ -51,9 +51,8 @@ def _name(section: Section) -> str:
 def _flags(section: Section) -> int:
     flags = section.flags & _KEPT
     if section.is_ram and section.type != c.SHT_NOBITS:
-        flags |= (
-            F.NOLOAD
-        )  # the contents are in .dinit; without this flag bin2hex overwrites program words with them (§7 item 4)
+        # The contents are in .dinit. Without this flag, bin2hex overwrites program words with them (§7 item 4).
+        flags |= F.NOLOAD
     if section.is_psv or section.is_eedata:
         flags &= ~(F.EXECINSTR | F.ABSOLUTE)
     return flags

@@ -52,7 +52,7 @@ def check_levels(image: Executable) -> None:
 
 @dataclass(frozen=True, slots=True)
 class _Function:
-    """What one function runs itself: its instructions, callees, and calls through pointers."""
+    """One function without its callees: its instructions, calls, and calls through pointers."""
 
     addresses: list[int]
     callees: list[int]

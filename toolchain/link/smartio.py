@@ -16,7 +16,7 @@ _FLOATING = frozenset("aAeEfFgG")
 
 
 def plain_name(name: str, where: str) -> str:
-    """Return the symbol of the plain function for such a name, else `name`; `where` is the object, for errors.
+    """Return the symbol of the plain function for a smart-io name, else `name`. `where` names the object in errors.
 
     Raises ToolError for a call with 32-bit doubles, which the library does not support.
     """

@@ -19,7 +19,7 @@ from toolchain.select.asm_inline import REGISTER_NAMES
 
 LABEL: Final = "__statement_"
 REFERENCE: Final = re.compile(r"\$(?:(\d+)|\{(\d+)(?::(\w))?\}|\{:uid\}|(\$))")
-"""Operand references in a template as clang spells them (GCC's %0, %d1, %=, and a dollar sign)."""
+"""Operand references in a template as clang writes GCC's %0, %d1 and %=; and an escaped dollar sign."""
 PART: Final = re.compile(r"[^,{]*\{[^}]*\}[^,]*|[^,]+")
 REGISTER: Final = re.compile(r"w(\d+)")
 

@@ -27,7 +27,7 @@ class Helper:
     meaning: Meaning
 
     @property
-    def gives(self) -> range:
+    def result_registers(self) -> range:
         """Return the numbers of the registers that hold the result."""
         return range(self.result // 16)
 
@@ -40,7 +40,7 @@ class Helper:
             words = [registers[place.register + k] for k in range(place.words)]
             values.append(words[0] if len(words) == 1 else z3.Concat(*reversed(words)))
         result = self.meaning(*values)
-        return [z3.simplify(z3.Extract(16 * k + 15, 16 * k, result)) for k in self.gives]
+        return [z3.simplify(z3.Extract(16 * k + 15, 16 * k, result)) for k in self.result_registers]
 
 
 def opaque(name: str, result: int) -> Meaning:

@@ -94,6 +94,7 @@ class OrderInvariant:
 
 def candidate_orders(rows: list[dict[ValueWord, int]], sizes: Mapping[ValueWord, int]) -> Iterator[OrderInvariant]:
     """Yield the order invariants that hold in all `rows` (values at each visit of a loop head).
+
     A constant word gives two of them. A variable word gives signed and unsigned orders against 0 and other words.
     """
     moving = [part for part in rows[0] if len({row[part] for row in rows}) > 1]

@@ -257,7 +257,7 @@ class Induction:
         for name, block in self.blocks.items():
             if name in self.dominators[head.name]:
                 for i in block.phis() if name == head.name else block.instrs:
-                    evaluator.again(path, i)
+                    evaluator.assign_before(path, i)
         return path
 
     def _state_at(self, head: LoopHead, path: Path) -> MachineState:

@@ -1,7 +1,7 @@
 """Memory model: shared bytes of source and machine, and the machine's private stack frame.
 
 W15 at entry is a number (`STACK`), so frame addresses are numbers.  The stack from the return address up is private:
-pointers reach only the variables that the source has there (`Frame.objects`).
+pointers reach only the variables that the source has there (`StackFrame.objects`).
 """
 
 from __future__ import annotations

@@ -90,8 +90,8 @@ class Path:
     def fix_store_order(self, barrier: bool) -> None:
         """Record a point that no store may cross.
 
-        If this point or the previous one is a compiler barrier, memory is known at the events between them: stores
-        before the previous point have been executed, stores after this one have not.
+        If this point or the previous one is a compiler barrier, memory is known at the events between both points:
+        stores before the previous point have been executed, stores after this one have not.
         """
         if barrier or self.behind_barrier:
             for number, memory in self.movable_events:

@@ -259,9 +259,10 @@ def factor(value: Any) -> Term | None:
 
 
 def product(a: Term, b: Term) -> Term:
-    """Return a * b of equal sizes; 32 bits as the machine's sum of three 16-bit products.
+    """Return a * b for operands of equal size.
 
-    The equality of both forms is hard to prove for solvers.
+    A 32-bit product is written as the machine computes it, the sum of three 16-bit products. For a solver it is hard
+    to prove that both forms are equal.
     """
     if a.size() != 2 * WORD or any(_is_extended(one) for one in (a, b)):
         return a * b

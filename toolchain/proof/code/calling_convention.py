@@ -207,14 +207,14 @@ class ConventionChecker:
         """Check the state at the end of an interrupt handler, which must also restore W0-W7 and the core registers."""
         for n in CALLER_SAVED:
             same = word(self.machine.w(n)) == self.registers[n]
-            require(same, self.machine.conditions, f"W{n} is not what it was")
+            require(same, self.machine.conditions, f"W{n} is not preserved")
         self._check_core_registers(CORE)
         self.check_return(state)
 
     def _check_core_registers(self, places: Iterable[int]) -> None:
         for at in places:
             same = self.machine.core(at) == self.machine.before[at]
-            require(same, self.machine.conditions, f"{CORE[at]} is not what it was")
+            require(same, self.machine.conditions, f"{CORE[at]} is not preserved")
 
     def check_return(self, state: MachineState, popped: bool = True) -> None:
         """Check the state at a return; `popped`: the return address has been popped from the stack."""
@@ -232,7 +232,7 @@ class ConventionChecker:
                     "the return address changes",
                 )
         for n in CALLEE_SAVED:
-            require(word(self.machine.w(n)) == self.registers[n], self.machine.conditions, f"W{n} is not what it was")
+            require(word(self.machine.w(n)) == self.registers[n], self.machine.conditions, f"W{n} is not preserved")
         self._check_core_registers(at for at, name in CORE.items() if name != "RCOUNT")
         self._check_accumulators(state)
         if self.path.result is not None:
@@ -248,7 +248,7 @@ class ConventionChecker:
     def _check_accumulators(self, state: MachineState) -> None:
         for n, before in enumerate(ACCUMULATORS):
             require(
-                wide(state.accumulators[n]) == before.wide, self.machine.conditions, f"ACC{'AB'[n]} is not what it was"
+                wide(state.accumulators[n]) == before.wide, self.machine.conditions, f"ACC{'AB'[n]} is not preserved"
             )
 
     def _result(self, state: MachineState) -> None:

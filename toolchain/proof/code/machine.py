@@ -257,7 +257,7 @@ class SymbolicMachine:
                 return narrow(value) if place is None else place
         elif size == 2:
             require(z3.Extract(0, 0, at) == 0, self.conditions, "reads a word at an odd address")
-        self._seen_page(at)
+        self._check_psv_page(at)
         return narrow(self.state.memory.read(at, size))
 
     def store(self, ea: Any, v: Any, size: int, ptr: int | None = None) -> None:
@@ -296,7 +296,7 @@ class SymbolicMachine:
             raise Refuted(f"a word at the odd address {found:#x}")
         return ea.word if found is None else found
 
-    def _seen_page(self, at: Any) -> None:
+    def _check_psv_page(self, at: Any) -> None:
         """Check that a read in the PSV window uses the page of constants."""
         page = self.core(PSVPAG)
         if not page.eq(self.page):
@@ -349,7 +349,7 @@ class SymbolicMachine:
                 f"writes another value than the source to {at if not isinstance(at, int) else hex(at)}",
             )
             if whole:
-                self._rest_as_read(e, distance)
+                self._check_other_byte(e, distance)
         if e.memory is not None and not self.state.accessed_bytes:
             self.check_memory(e)
         bytes_done = set(range(e.size)) if whole else self.state.accessed_bytes | set(range(distance, distance + size))
@@ -367,8 +367,8 @@ class SymbolicMachine:
         here = vector(at, 16) if isinstance(at, int) else at
         return next((k for k in range(0, e.size, size) if self._same(here, e.address + k)), None)
 
-    def _rest_as_read(self, e: Event, distance: int) -> None:
-        """Check that a single-bit write stores the other byte with the value read."""
+    def _check_other_byte(self, e: Event, distance: int) -> None:
+        """Check that a single-bit write leaves the register's other byte as the source has read it."""
         before = self.events[self.state.event - 1] if self.state.event else None
         if before is None or before.kind != "read" or before.size != 2 or not self._same(before.address, e.address):
             raise Refuted("writes a single bit where the source did not read the register immediately before")

@@ -169,8 +169,8 @@ class Evaluator(Effects):
 
     # -- instructions ------------------------------------------------------------------------------------------------
 
-    def again(self, path: Path, i: Instr) -> None:
-        """Assign a value to an instruction before the start of a path: computed, or unknown if it depends on memory."""
+    def assign_before(self, path: Path, i: Instr) -> None:
+        """Assign the value of an instruction that precedes a path: computed, or unknown if it depends on memory."""
         if i.type.kind == "void":
             return
         callee = i.args[-1] if i.op == "call" else None
