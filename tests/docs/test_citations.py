@@ -32,7 +32,7 @@ def sections(page: Path) -> frozenset[str]:
 
 
 def citations(text: str) -> Iterator[tuple[str, str]]:
-    """Return page and section of every citation in a text. A citation may contain a line break or a comment sign."""
+    """Yield page and section of every citation in a text. A citation may contain a line break or a comment sign."""
     joined = re.sub(r"\s*\n\s*(?:#|//|\*|;)?\s*", " ", text)
     for name, numbers in CITATION.findall(joined):
         for number in NUMBER.findall(numbers):

@@ -34,7 +34,7 @@ OPENERS = {".xz": lzma.open, ".gz": gzip.open}
 
 
 def semantic_lines(folder: Path) -> Iterator[str]:
-    """Return the lines of all files of semantic vectors, one vector each."""
+    """Yield the lines of all files of semantic vectors, one vector each."""
     for file in sorted(folder.glob("semantics*.jsonl.*")):
         with OPENERS[file.suffix](file, "rt") as lines:
             yield from lines

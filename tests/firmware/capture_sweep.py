@@ -86,7 +86,7 @@ def capture_at(machine: Machine, state: bytes, offset: int, masked: int = 0) -> 
 
 
 def offsets(step: int) -> Iterator[int]:
-    """Return the cycle offsets to be tried within an instruction or a sleep."""
+    """Yield the cycle offsets to be tried within an instruction or a sleep."""
     yield from range(min(step, LONGEST_STEP))
     yield from range(LONGEST_STEP, step, IDLE_STRIDE)
 

@@ -48,7 +48,7 @@ def scene() -> Scene:
 
 
 def facing(centimetres: float, turned_deg: float = 0.0) -> Poses:
-    """Return poses of a camera robot and of a second robot that faces its lens, turned to the left by `angle`."""
+    """Return poses of a camera robot and of a second robot that faces its lens, turned to the left by `turned_deg`."""
     there = LENS_X + centimetres + dimensions.ROBOT_RADIUS
     return Poses([CAMERA, (there, 150.0, math.pi + math.radians(turned_deg))], [])
 

@@ -42,7 +42,7 @@ def eager(engine: str = "jit", ipl_slip: int = 0) -> Machine:
 
 
 def pair(firmware: Firmware, ipl_slip: int = 0) -> Iterator[Machine]:
-    """Return two machines with the same firmware, one per engine."""
+    """Yield two machines with the same firmware, one per engine."""
     for engine in ("plain", "jit"):
         machine = eager(engine, ipl_slip)
         load(machine, firmware)

@@ -20,7 +20,7 @@ CYCLES = 1500
 
 
 class Plain:
-    """Reference model of the converter. `half` counts half Tcy; a write takes effect in the cycle after it."""
+    """Reference model of the converter, advanced by half Tcy. A write takes effect in the cycle after it."""
 
     def __init__(self, level: Callable[[int, int], int]) -> None:
         self.word = dict.fromkeys(("ADCON1", "ADCON2", "ADCON3", "ADCHS", "ADCSSL"), 0)

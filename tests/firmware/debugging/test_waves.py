@@ -20,7 +20,7 @@ FCY = 14_745_600
 
 
 def picoseconds(cycle: int) -> int:
-    """Convert cycles to picoseconds: a cycle is 10^10 / 147456 ps (see docs/instruments.md)."""
+    """Convert cycles of the e-puck to picoseconds: a cycle is 10^10 / 147456 ps."""
     return round(Fraction(cycle * 10**10, 147_456))
 
 

@@ -75,7 +75,7 @@ def start() -> MachineState:
 
 
 def results(words: list[int]) -> Iterator[MachineState]:
-    """Return the states at RETURN of every feasible path. Raises AssertionError for code with a loop."""
+    """Yield the state at RETURN of every feasible path. Raises AssertionError for code with a loop."""
     page = vector(0, 16)
     machine = Free(StackFrame(), [], [], page, page)
     work, steps = [start()], 0

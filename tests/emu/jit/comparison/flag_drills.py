@@ -199,7 +199,7 @@ def drill(draw: random.Random, turn: int) -> tuple[list[int], list[Insn]]:
 
 
 def pairs_of(insns: list[Insn]) -> Iterator[tuple[Kind, str, Kind]]:
-    """Return the pairs of an instruction that writes a flag and the next instruction that reads it."""
+    """Yield the pairs of an instruction that writes a flag and the next instruction that reads it."""
     last: dict[str, Kind] = {}
     for insn in insns:
         for name in asked(insn):
