@@ -65,9 +65,8 @@ def clusters(places: Places, reach_cm: float) -> list[int]:
 def _adjacent(places: Places, reach_cm: float) -> coo_array:
     """Return the adjacency matrix of objects nearer to each other than `reach_cm`, as a sparse matrix."""
     count = len(places)
-    pairs = cKDTree(places).query_pairs(
-        reach_cm, output_type="ndarray"
-    )  # includes pairs at exactly this distance, which are not adjacent
+    # The tree also returns pairs at exactly this distance, which are not adjacent.
+    pairs = cKDTree(places).query_pairs(reach_cm, output_type="ndarray")
     one, other = places[pairs[:, 0]], places[pairs[:, 1]]
     near = pairs[((one - other) ** 2).sum(axis=1) < reach_cm**2]
     return coo_array((np.ones(len(near), dtype=np.int8), (near[:, 0], near[:, 1])), shape=(count, count))

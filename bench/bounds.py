@@ -141,7 +141,7 @@ class CallMeter:
             _merge(one.most, found)
 
     def set_newest_pid(self) -> bool:
-        """Make the greatest PID the newest one, so that the next PIDs wrap around."""
+        """Make the greatest PID the newest one, so that the next PIDs wrap around. A hook: False continues the run."""
         self.machine.poke(NEWEST, LAST)
         return False
 
@@ -159,13 +159,13 @@ class CallMeter:
         return hook
 
     def discard_calls(self) -> bool:
-        """Discard the calls in progress: an interrupt or a thread switch disturbs them."""
+        """Discard the calls in progress, which an interrupt or a thread switch disturbs. A hook."""
         for one in self.open_calls:
             one.counts = False
         return False
 
     def mark_not_plain(self) -> bool:
-        """Mark the calls in progress as not plain."""
+        """Mark the calls in progress as not plain. A hook."""
         for one in self.open_calls:
             one.plain = False
         return False

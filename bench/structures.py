@@ -65,7 +65,10 @@ class Structures:
             raise _Torn from None
 
     def _list(self, link: int, step: int) -> Iterator[int]:
-        """Yield the addresses of a list's members. `word`: address of the pointer to the first member."""
+        """Yield the addresses of a list's members.
+
+        `link`: address of the pointer to the first member; `step`: offset in a member of the pointer to the next one.
+        """
         for _ in range(MOST):
             member = self._word(link)
             if not member:
@@ -75,7 +78,7 @@ class Structures:
         raise _Torn
 
     def _ring(self, first: int) -> set[int]:
-        """Yield the addresses of the ready threads."""
+        """Return the addresses of the threads in a ring, such as that of the ready threads."""
         found: set[int] = set()
         while first and first not in found:
             found.add(first)

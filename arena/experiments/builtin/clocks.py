@@ -37,9 +37,8 @@ def all_curves(samples: TrialSamples) -> Mapping[str, Floats]:
     differ = apart(leads, living)
     sums, count = np.where(living, leads, 0.0).sum(axis=1), np.maximum(living.sum(axis=1), 1)
     means = sums / count
-    apart_at = np.flatnonzero(
-        ~(differ <= AGREED_MS)
-    )  # until then a robot may have a better time without having reported it
+    # Before the clocks agree, a robot may have a better time than the one that it has reported last.
+    apart_at = np.flatnonzero(~(differ <= AGREED_MS))
     begin = int(apart_at[-1]) + 1 if len(apart_at) else 0
     drift = np.full(len(means), np.nan)
     drift[begin:] = means[begin:] - means[begin : begin + 1]
