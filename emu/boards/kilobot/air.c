@@ -76,9 +76,9 @@ static u64 tick_of(const struct robot *r, u64 cycle)
     return tick;
 }
 
-// Return the earliest tick at which the robot can send light. A robot in a waiting loop cannot before its next event or
-// the end of its countdown.
-static u64 acts_at(const struct robot *r)
+// Return the earliest tick at which the robot can send light. A robot in a waiting loop sends none before its next event
+// or the end of its countdown.
+static u64 earliest_light(const struct robot *r)
 {
     const struct avr *m = r->avr;
     u64 counts = m->resting || m->halted ? ~0ULL : m->counts_until;
@@ -91,9 +91,9 @@ static u64 acts_at(const struct robot *r)
     return first > r->reached ? first : r->reached;
 }
 
-static void note_when_it_acts(struct air *a, const struct robot *r)
+static void update_earliest_light(struct air *a, const struct robot *r)
 {
-    a->acts[r - a->robots] = acts_at(r);
+    a->acts[r - a->robots] = earliest_light(r);
 }
 
 static int is_before(const struct edge *e, const struct edge *other)
@@ -116,12 +116,12 @@ static int add_edge(struct air *a, struct robot *r, struct edge edge)
         place--;
     }
     r->edges[place] = edge;
-    note_when_it_acts(a, r);
+    update_earliest_light(a, r);
     return 1;
 }
 
-// Apply the edges up to tick `until` to the robot's inputs, those of one tick together. The comparator's input is light
-// or darkness. The converter's inputs keep the strength, because a conversion samples after the end of the pulse.
+// Apply the edges up to tick `until` to the robot's inputs; edges of one tick are applied together. The comparator's
+// input is light or darkness. The converter's inputs keep the strength, because a conversion samples after the pulse.
 static void deliver(struct air *a, struct robot *r, u64 until)
 {
     u32 done = 0;
@@ -209,7 +209,7 @@ static int run_robot(struct air *a, i64 index, u64 goal)
             r->reached = reached;
             return 1;
         } else if (reached < piece)
-            reached = piece; // the goal is between two cycles of this robot
+            reached = piece; // `piece` is between two cycles of this robot
         r->reached = reached;
     }
     return 0;
@@ -220,7 +220,7 @@ i64 air_run(struct air *a, i64 until)
 {
     u64 end = (u64)until;
     for (i64 n = 0; n < a->count; n++)
-        note_when_it_acts(a, a->robots + n);
+        update_earliest_light(a, a->robots + n);
     for (;;) {
         u64 first = ~0ULL, second = ~0ULL;
         for (i64 n = 0; n < a->count; n++) {
@@ -241,7 +241,7 @@ i64 air_run(struct air *a, i64 until)
             if (a->acts[n] >= before)
                 continue;
             int stops = run_robot(a, n, goal);
-            note_when_it_acts(a, a->robots + n);
+            update_earliest_light(a, a->robots + n);
             if (stops)
                 return n;
         }
