@@ -17,6 +17,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
+from arena.scene import dimensions
+
 Points = tuple[tuple[float, ...], ...]
 """Points (x, y) in cm, or poses (x, y, heading in degrees)."""
 FCY: Final = 14_745_600
@@ -51,9 +53,9 @@ class Robots:
     """
 
     count: int = 5
-    axle_cm: float = 5.1
-    thrust_n: float = 1.0
-    brake_n: float = 1.04
+    axle_cm: float = dimensions.AXLE
+    thrust_n: float = dimensions.THRUST
+    brake_n: float = dimensions.BRAKE
     wheel_noise: float = 0.05
     noise_period_s: float = 0.1
     camera_yaw_sd_deg: float = 0.0
@@ -67,9 +69,9 @@ class Objects:
     """Movable discs of one kind on marks; [[objects]] tables describe other objects."""
 
     count: int = 20
-    radius_cm: float = 5.0
-    mass_kg: float = 0.035
-    floor_friction: float = 0.58
+    radius_cm: float = dimensions.OBJECT_RADIUS
+    mass_kg: float = dimensions.OBJECT_MASS
+    floor_friction: float = dimensions.FLOOR_FRICTION
 
 
 @dataclass(frozen=True, slots=True)
@@ -314,12 +316,12 @@ class ObjectKind(Placed):
       infrared light
     """
 
-    radius_cm: float = 5.0
+    radius_cm: float = dimensions.OBJECT_RADIUS
     polygon: Points = ()
     heading_deg: float = math.nan
-    height_cm: float = 10.0
-    mass_kg: float = 0.035
-    floor_friction: float = 0.58
+    height_cm: float = dimensions.OBJECT_HEIGHT
+    mass_kg: float = dimensions.OBJECT_MASS
+    floor_friction: float = dimensions.FLOOR_FRICTION
     colour: str = "red"
     share: float = 0.8
 

@@ -25,7 +25,6 @@ if TYPE_CHECKING:
 
 DISI_LEVEL: Final = 6
 """Highest priority that DISI masks (isa.md §12)."""
-IPL_SHIFT: Final = 5
 EXCEPTION_ENTRY: Final = -1
 """Address under which the cycles of an exception entry are logged."""
 LOGGED: Final = 1 << 20

@@ -28,7 +28,6 @@ class Fixup:
     kind: RelocationType
     value: ExprValue
     place: SourceLocation
-    next_word: bool = False  # CALL, GOTO: the next word holds the high part of the address
 
 
 @dataclass(slots=True, eq=False)

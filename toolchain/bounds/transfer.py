@@ -55,7 +55,6 @@ STACK = 15
 MAX_TABLE = 64
 """Greatest number of entries of a constant table that one load enumerates."""
 IPL_BITS = 0xE0
-ANY_IPL = (0, 7)
 
 
 @dataclass(slots=True)

@@ -20,10 +20,6 @@ from emu.peripherals import Peripherals
 
 PORT: Final = 3
 """Port of the motors: left motor on bits 3:0, right motor on bits 7:4 of port D (epuck.md §2)."""
-STEPS_PER_TURN: Final = 1000
-"""Motor steps per turn of the wheel: 20 steps per turn of the motor, gear 50:1 (epuck.md §3)."""
-MM_PER_STEP: Final = 0.128
-"""Travel of the wheel's rim per step in mm (epuck.md §3)."""
 
 _NOWHERE: Final = 4
 """Phase index before the first coil pattern."""
@@ -64,7 +60,6 @@ class Stepper(BoardPart):
     def __init__(self, name: str, chip: Peripherals, shift: int, forward: int) -> None:
         super().__init__(name, chip)
         self._shift: Final = shift
-        self._forward: Final = forward
         field = self.record.reserve(f"{name}.state", "q", 8)
         self._state: Final = self.record.s64[field.index : field.index + 8]
         self._state[_INDEX] = _NOWHERE

@@ -155,11 +155,6 @@ def parse(statement: str, expr: Expr = Number.read) -> Parsed:
     raise StatementError(f"{statement}: operands fit none of {accepted}")
 
 
-def is_mnemonic(name: str) -> bool:
-    """Return whether ``name`` is a mnemonic, in upper or lower case."""
-    return name.lower() in FORMS
-
-
 def split_operands(text: str) -> list[str]:
     """Split an operand list at commas outside brackets, parentheses and character literals."""
     pieces, depth, start, i = [], 0, 0, 0
