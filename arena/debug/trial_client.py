@@ -44,7 +44,7 @@ class DebugSession:
         self.finished: FinishedTrial | None = None
         """The trial, after its first end; a rewind may follow."""
         self.is_over = False
-        """Whether the trial has ended for good."""
+        """Whether the trial has ended and cannot be rewound any more."""
         self.is_detached = False
         """Whether the debugger has detached from the robot."""
         self.has_fault = False

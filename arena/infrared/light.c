@@ -102,7 +102,7 @@ i64 emit(const struct emission *e, i64 line, i64 lit, i64 cycle)
     i64 at = e->on_at + cycle;
     i64 last = t->count ? t->cycles[t->count - 1] : -1;
     if (at < last || (at == last && (t->lit[t->count] >> line & 1) == lit))
-        return 1; // a replay of the past adds nothing
+        return 1; // a replay: the history already has this edge
     return append(t, e->receivers, at, line, lit);
 }
 

@@ -93,7 +93,7 @@ struct scheduler {
     i64 count;
     struct robot *const *robots;
     const f64 *const *speeds;
-    i64 room; // quanta whose speeds are kept
+    i64 room; // capacity of `speeds`, in quanta
     struct native_world *native_world;
     i64 world_goal; // tick to which Python must advance the world
     i64 worker_count;

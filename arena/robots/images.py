@@ -61,7 +61,10 @@ def _kilobot_image(brain: str, home: Path) -> Path:
 
 
 def _output_folder(folder: Path, name: str) -> Path:
-    """Return the folder for images of a folder of firmware: below it, or in the user's cache if it is not writable."""
+    """Return the folder for the images of applications in `folder`.
+
+    In a checkout it is below `folder`. If that is not writable, and in an installed package, it is in the user's cache.
+    """
     if paths.in_checkout() and os.access(folder, os.W_OK):
         return folder / "build" / name
     out = paths.images() / (name or folder.name)

@@ -33,7 +33,10 @@ class TableErrors:
         self._lines = text.splitlines()
 
     def at(self, table: str, key: str, words: str, number: int | None = None) -> SceneError:
-        """Return an error about a key of the `number`th table of a name, or (empty key) about the table itself."""
+        """Return an error about a key of a table, or about the table itself if `key` is empty.
+
+        `number`: position among the tables of that name, from 0; None if there is one table.
+        """
         line = self._find(table, key, number) if self._lines else None
         return SceneError(f"{self._path}{f':{line}' if line else ''}: {words}")
 

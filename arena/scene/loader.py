@@ -124,7 +124,7 @@ class Scene:
         )
 
     def off_tick(self, robot: int) -> int:
-        """Return the tick at which a robot's battery is removed; after every trial if it never is."""
+        """Return the tick at which a robot's battery is removed; 2^62 if it stays for the whole trial."""
         for one, seconds in self.start.off:
             if one == robot:
                 return round(seconds * FCY / self.clock.quantum_tcy)

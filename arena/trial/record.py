@@ -213,7 +213,7 @@ def kind_of(column: str) -> pa.DataType:
     )
     kinds = {"log": said, "messages": sent, "lights": shown, "seen": pa.int16(), "leds": pa.int16(),
              "strip": pa.binary(), "infrared": pa.list_(pa.int16())}  # fmt: skip
-    is_free = column.startswith(FREE_COLUMNS)  # the experiment chooses these names, so they can end like any other
+    is_free = column.startswith(FREE_COLUMNS)  # names chosen by the experiment may end with a key of `kinds`
     return pa.float64() if is_free else kinds.get(column.rsplit("_", 1)[-1], pa.float64())
 
 

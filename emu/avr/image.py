@@ -182,7 +182,7 @@ def _read_elf(data: bytes, path: str) -> AvrImage:
 
 
 def _refuse_other_device(elf: ELFFile, path: str) -> None:
-    """Raise LoadError if the file is built for a microcontroller that the ATmega328P cannot stand in for."""
+    """Raise LoadError if the file is built for a microcontroller whose code the ATmega328P cannot run."""
     note = elf.get_section_by_name(DEVICE_NOTE)
     named = _DEVICE.search(note.data()) if note is not None else None
     if named and not _COMPATIBLE.fullmatch(device := named[0].decode("ascii")):

@@ -55,7 +55,7 @@ OVERFLOW_FUNCTION: Final = "_os_overflow"
 """Function of OpenSwarm that ends a thread after its stack overflow (firmware/openswarm/kernel/fault.c)."""
 RUNNING_THREAD: Final = "_os_running"
 LARGEST_GUARD: Final = 128
-"""Bytes from a thread's stack limit to its control block, at most (firmware/openswarm/port/dspic30f/cpu.c)."""
+"""Maximum number of bytes from a thread's stack limit to its control block (port/dspic30f/cpu.c of the kernel)."""
 RESET_WORD: Final = 0xFE0000
 CHECKS: Final = {
     0: "integer overflow in an addition",

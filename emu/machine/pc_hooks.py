@@ -20,7 +20,7 @@ class PcHooks:
     def add(
         self, address: int, hook: PcHook, when: Filter | None, on_change: Callable[[], None]
     ) -> Callable[[], None]:
-        """Add a hook and return a function that removes it. `on_change` is called after each of both."""
+        """Add a hook and return a function that removes it. `on_change` is called after addition and removal."""
         self.by_address.setdefault(address, []).append(hook)
         self.filters.setdefault(address, []).append(when)
         on_change()

@@ -63,7 +63,7 @@ class BoundsReport:
 
     @property
     def unbounded_responses(self) -> dict[str, str]:
-        """Return the reasons why responses have no bound: source line -> endless masking, or a stopped clock."""
+        """Return the reasons why responses have no bound, by source line: endless masking, or a stopped clock."""
         rows = [row for row in self.rows if row.masked_for_ever and row.level < TRAP_LEVEL]
         highest: dict[str, int] = {}
         for row in rows:

@@ -277,7 +277,7 @@ def _modify_words_register(s: SelectionContext, op: str, targets: list[Operand],
 
 
 def _modify_words_constant(s: SelectionContext, op: str, targets: list[Operand], value: int) -> None:
-    """Emit (words in near memory) op= constant; neutral words are skipped if no carry enters them."""
+    """Emit (words in near memory) op= constant. Words that the operation leaves unchanged are skipped."""
     neutral = 0xFFFF if op == "and" else 0
     carry = False
     for k, target in enumerate(targets):

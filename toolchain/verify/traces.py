@@ -121,7 +121,10 @@ class TraceAutomaton:
         return {event: frozenset(after) for event, after in out.items()}
 
     def check(self, after: TraceAutomaton, same_blocks: bool) -> None:
-        """Raise MachineError if `after` has other traces; with `same_blocks` also if a block has other accesses."""
+        """Raise MachineError if `after` has additional traces.
+
+        With `same_blocks`, also raise it if any block lost or gained volatile accesses.
+        """
         if same_blocks and {n: sorted(k) for n, k in after.numbers.items()} != {
             n: sorted(k) for n, k in self.numbers.items()
         }:

@@ -134,7 +134,7 @@ class Exceptions(RuleInterpreter):
     def acceptable(self, last: int) -> Accepted | None:
         """Return the exception that the boundary after cycle `last` accepts, or None.
 
-        A request that becomes acceptable later merely by time posts the recheck event.
+        If a request will become acceptable in a later cycle without any other event, the recheck event is posted.
         """
         pending = self._state.intcon1 & self.traps.flags
         slip = last + 1 if self.ipl_slip else None

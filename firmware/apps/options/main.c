@@ -1,4 +1,4 @@
-/* One call of an option in each scene, measured from outside between symbols. README.md. */
+/* Measures the kernel's options: the host runs one call per scene between two symbols (README.md). */
 #include "hal_compiler.h"
 #include "options.h"
 

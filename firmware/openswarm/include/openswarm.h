@@ -123,8 +123,8 @@ void Sys_Yield(void);
 void Sys_Sleep(uint16 ms);
 /* T with SYS_PERIODIC | until its next release | ~240 + 20 n | 60 | CONTEXT, PROCESS.  True: the deadline was met. */
 bool Sys_Wait_for_Period(void);
-/* MTHI | no | 20 | 4 | none.  Nests. Until the matching End, no thread switch occurs and no handler runs; a slice end
- * inside is taken there. Interrupts stay enabled. An open section ends with its thread, or with the handlers. In an ISR
+/* MTHI | no | 20 | 4 | none.  Nests. Until the matching End, no thread switch occurs and no handler runs; the End
+ * takes a slice end that is due. Interrupts stay enabled. An open section ends with its thread, or with the handlers. In an ISR
  * neither call has an effect. */
 void Sys_Start_CriticalSection(void);
 void Sys_End_CriticalSection(void);

@@ -1,4 +1,4 @@
-"""Light between Kilobots at the pulse: answers, light that ends, many senders at once, losses by distance, and the
+"""Light pulses between Kilobots: answers, ends of light, simultaneous senders, losses by distance, and the message
 counts of real robots."""
 
 from __future__ import annotations

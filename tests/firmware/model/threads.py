@@ -245,7 +245,7 @@ class Threads(Calls):
                 self.rotate()
 
     def settle(self) -> Step:
-        """Give the CPU up if an interrupt demands it and no critical section is open."""
+        """Yield the CPU if an interrupt requests it and no critical section is open."""
         if (self.forced or self.slice_over) and not self.depth and self.started:
             yield "preempted"
 

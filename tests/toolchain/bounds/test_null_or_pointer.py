@@ -1,4 +1,4 @@
-"""Sets that hold 0 and addresses: what a function returns that finds a place or none; targets that are not linked."""
+"""Abstract values of a pointer that may be NULL; annotated call targets that the linker has dropped."""
 
 from __future__ import annotations
 

@@ -36,7 +36,7 @@ void hal_uart_start(uint8_t uart)
 {
     if (uart == SYS_UART1) {
         IEC0bits.U1RXIE = 1;
-        hal_barrier(); /* smaller than one path with two sets of addresses */
+        hal_barrier(); /* keeps the branches apart: merged code is larger */
     } else {
         IEC1bits.U2RXIE = 1;
     }

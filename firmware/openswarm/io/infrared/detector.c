@@ -9,7 +9,7 @@
 enum {
     COUNT = 16,
     SPREAD_FINE = 4, /* the spread is in 1/64 of a count */
-    SPREADS = 4,     /* 75 % of a normal distribution are within 1.15 sigma: the threshold is 4.6 sigma of the level */
+    SPREADS = 4,     /* the spread is 1.15 sigma, 75 % of a normal distribution: the threshold is 4.6 sigma */
     SPREAD_MOST = 15 * COUNT * SPREAD_FINE,
     RISING = 3, /* increase of the spread per update; it decreases by 1: balanced if one level in four is above it */
     STEP = 4,   /* change of the background per update: 32 counts a second */

@@ -113,7 +113,7 @@ static void next_row(void)
 
 static void refresh(void)
 {
-    wanted_parts = 0; /* they belong to the previous program */
+    wanted_parts = 0; /* the wanted parts belong to the previous program */
     memset(served, 0, sizeof served);
     if (!Sys_Get_StoredUpdate(&have, &is_active)) {
         have = (sys_update){0, 0, 0};
