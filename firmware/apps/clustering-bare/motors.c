@@ -48,6 +48,6 @@ void motors_init(void)
 
 void motors_drive(uint8_t left_mm_s, uint8_t right_mm_s)
 {
-    left.rate = (uint16_t)(left_mm_s * RATE); /* one store each: a tick in between only sees one of them early */
+    left.rate = (uint16_t)(left_mm_s * RATE); /* one store each: a tick between both uses one new and one old rate */
     right.rate = (uint16_t)(right_mm_s * RATE);
 }

@@ -35,10 +35,10 @@ typedef char kernel_stack_is_whole_steps[SYS_KERNEL_STACK % HEAP_STEP == 0 ? 1 :
 
 os_memory_space os_memory;
 
-static uint8 *reserve_begin, *reserve_end; /* protected by level device */
-static hole *holes;       /* root of the tree, whose leaves are no_hole; protected by level slice */
+static uint8 *reserve_begin, *reserve_end; /* devices locked */
+static hole *holes;       /* root of the tree, whose leaves are no_hole; slice locked */
 static hole no_hole;      /* sentinel of size 0 */
-static uint8 *free_run, *free_run_end; /* adjacent blocks freed last, not yet in the tree; level slice */
+static uint8 *free_run, *free_run_end; /* adjacent blocks freed last, not yet in the tree; slice locked */
 
 void heap_init(void)
 {
