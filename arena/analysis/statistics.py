@@ -103,7 +103,7 @@ def sign_flip_test(one: Values, other: Values, seed: int = 0) -> SignFlipTest:
     if not len(moved):
         p = 1.0
     elif len(moved) == 1:
-        p = 1.0  # a flip of the only pair is as extreme
+        p = 1.0  # with one pair, both signs are equally extreme
     else:
         draws = np.inf if len(moved) <= EXACT_PAIRS else DRAWS
         p = float(permutation_test((moved,), np.mean, permutation_type="samples", vectorized=True, n_resamples=draws,

@@ -14,7 +14,7 @@ NAMES: Final = {"Rd": "data[d]", "Rr": "data[r]", "R0": "data[0]"}
 
 
 SPECIAL: Final = ("ILLEGAL", "END", "COUNT_DOWN", "RESTART")
-"""Operations behind those of the rows; `row_of` returns the first one for a word without a row."""
+"""Operations without a row, numbered after those of the rows. `row_of` returns ILLEGAL for a word without a row."""
 
 
 def decoder() -> str:

@@ -52,8 +52,10 @@ def test_a_skip_on_a_window_bit_takes_both_extras(engine: str, bit: int, cycles:
 
 
 def test_a_stall_adds_to_window_cycles(engine: str) -> None:
-    """isa.md §13.3, its example: a stall adds to window cycles: ADD W0,[W1],[W2++] takes 3 cycles, MOV [W2],[W3] the
-    stall and 1."""
+    """A stall adds to window cycles: ADD W0,[W1],[W2++] takes 3 cycles, MOV [W2],[W3] 1 cycle after a stall of 1.
+
+    Source: the example in isa.md §13.3.
+    """
     assert windowed(engine, "add w0, [w1], [w2++]\nmov [w2], [w3]\nend: nop", w1=TABLE).cycles_to() == 5
 
 

@@ -7,9 +7,9 @@
 #include "openswarm.h"
 
 enum {
-    MOST_RECORDS = 300, /* a run ends after so many records, */
-    MOST_IDLES = 50,    /* or after the kernel has idled so often */
-    MOST_STARTS = 40,   /* later starts of threads are skipped */
+    MOST_RECORDS = 300, /* number of records after which a run ends */
+    MOST_IDLES = 50,    /* number of times the kernel idles after which a run ends */
+    MOST_STARTS = 40,   /* number of thread starts; further ones are skipped */
     MOST_PIDS = 256,
     SIZES = 15
 };

@@ -105,7 +105,7 @@ class Trial:
         return STEPWISE, "Python", "1 thread", f"{self.threads} threads"
 
     def run(self, mode: str, tally: Counter[str]) -> list[list[Any]]:
-        """Run the trial in one mode and return the state at each of its moments."""
+        """Run the trial in one mode and return the states at the chosen times."""
         scene, channel, world = self.scene, OpticalChannel.of(self.scene), World(self.scene, self.seed)
         several = enumerate(zip(self._images, self._selectors, strict=True))
         robots = [Robot(scene, self.seed, number, image, selector, channel) for number, (image, selector) in several]
