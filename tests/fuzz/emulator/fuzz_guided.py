@@ -1,0 +1,145 @@
+"""Damaged files chosen by coverage: inputs that reach new branches of the readers are kept and damaged further.
+
+`python tests/fuzz/emulator/fuzz_guided.py [--kinds N] [--seed S] [--seconds T] [--format NAME] [--keep]` passes the
+files of `file_formats.py` to their commands with Atheris, one kind after the other, and exits with 1 at the first input
+with another outcome than a documented status. Each kind begins with its corpus, `tests/fuzz/corpus/KIND.zip`; `--keep`
+stores the smallest set of inputs that reach as much. Exit status 77 without Atheris.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import random
+import re
+import subprocess
+import sys
+import tempfile
+import zipfile
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[3]
+sys.path.insert(0, str(ROOT))
+
+from tests.fuzz.seeds import SKIPPED, Campaign, parser  # noqa: E402
+
+CORPUS = ROOT / "tests" / "fuzz" / "corpus"
+LARGEST = 16_384
+"""Maximum length of an input in bytes; the samples of records and images are shorter."""
+SECONDS = 4.0
+"""Seconds for each kind of file, beside a start of about ten."""
+STEADY = (1980, 1, 1, 0, 0, 0)
+"""Time of all entries of an archive, so that equal corpora are equal files."""
+
+
+def unpack(kind: str, folder: Path) -> None:
+    """Write the corpus of a kind of file into `folder`, one file per input."""
+    folder.mkdir()
+    archive = CORPUS / f"{kind.replace(' ', '-')}.zip"
+    if archive.exists():
+        with zipfile.ZipFile(archive) as stored:
+            stored.extractall(folder)
+
+
+def pack(kind: str, folder: Path) -> int:
+    """Store the inputs in `folder` as the corpus of a kind of file. Return their number."""
+    CORPUS.mkdir(exist_ok=True)
+    inputs = sorted(path.read_bytes() for path in folder.iterdir())
+    with zipfile.ZipFile(
+        CORPUS / f"{kind.replace(' ', '-')}.zip", "w", zipfile.ZIP_DEFLATED, compresslevel=9
+    ) as stored:
+        for number, data in enumerate(inputs):
+            stored.writestr(zipfile.ZipInfo(f"{number:03}", STEADY), data, zipfile.ZIP_DEFLATED)
+    return len(inputs)
+
+
+def fuzz(kind_name: str, arguments: list[str]) -> None:
+    """Run libFuzzer with its `arguments` on one kind of file in this process, which ends with libFuzzer's status."""
+    import atheris
+
+    with atheris.instrument_imports(include=["emu", "toolchain", "arena"]):
+        from tests.fuzz.file_formats import Bench, damaged
+
+    with tempfile.TemporaryDirectory(prefix="guided-") as name:
+        bench = Bench(Path(name))
+        kind = next(one for one in bench.formats if one.name == kind_name)
+
+        def attempt(data: bytes) -> None:
+            bench.attempt(kind, data or kind.sample)
+
+        def mutate(data: bytes, largest: int, seed: int) -> bytes:
+            rng = random.Random(seed)
+            if rng.random() < 0.3:
+                return bytes(atheris.Mutate(data, largest))
+            return damaged(kind, data if rng.random() < 0.9 and data else kind.sample, rng)[:largest]
+
+        os.chdir(name)
+        atheris.Setup([sys.argv[0], *arguments], attempt, custom_mutator=mutate)
+        atheris.Fuzz()
+
+
+def run(kind: str, folder: Path, arguments: list[str]) -> tuple[int, str]:
+    """Fuzz one kind of file in a child process. Return its status and what it printed."""
+    command = [sys.executable, __file__, "--child", kind, *arguments]
+    done = subprocess.run(command, capture_output=True, text=True, errors="replace", cwd=folder, check=False)
+    lines = [line for line in (done.stdout + done.stderr).splitlines() if not line.startswith("INFO: ")]
+    return done.returncode, "\n".join(lines)
+
+
+def explore(kind: str, seed: int, seconds: float, keep: bool) -> tuple[int, str]:
+    """Fuzz a kind of file for some seconds. Return the number of inputs, and the failure or ""."""
+    with tempfile.TemporaryDirectory(prefix="corpus-") as name:
+        folder = Path(name)
+        unpack(kind, folder / "inputs")
+        limits = [
+            f"-max_len={LARGEST}",
+            "-rss_limit_mb=8192",
+            "-timeout=300",
+            "-error_exitcode=1",
+            "-timeout_exitcode=1",
+        ]
+        ends = [f"-max_total_time={max(1, round(seconds))}", f"-seed={seed}", "-print_final_stats=1"]
+        status, said = run(kind, folder, [str(folder / "inputs"), f"-artifact_prefix={folder}/", *limits, *ends])
+        tried = re.search(r"stat::number_of_executed_units:\s*(\d+)", said)
+        if status:
+            damage = b"".join(path.read_bytes() for path in folder.glob("*-*") if path.is_file())
+            return 0, f"{kind}: {damage[:4000]!r}\n{said[-6000:]}"
+        if keep:
+            (folder / "fewest").mkdir()
+            status, said = run(kind, folder, ["-merge=1", *limits, str(folder / "fewest"), str(folder / "inputs")])
+            if status:
+                return 0, f"{kind}: {said[-6000:]}"
+            pack(kind, folder / "fewest")
+        return int(tried[1]) if tried else 0, ""
+
+
+def main() -> int:
+    if sys.argv[1:2] == ["--child"]:
+        fuzz(sys.argv[2], sys.argv[3:])
+    made = parser(__doc__)
+    made.add_argument("--format", metavar="NAME", help="this kind of file only")
+    made.add_argument(
+        "--each", type=float, default=SECONDS, metavar="S", help=f"seconds per kind (default {SECONDS:g})"
+    )
+    made.add_argument("--keep", action="store_true", help="store the corpus")
+    plan = Campaign(made, "kinds", 25, "kinds of files")
+    options = plan.parse()
+    if importlib.util.find_spec("atheris") is None:
+        print("atheris is not installed (extra: test)")
+        return SKIPPED
+    from tests.fuzz.file_formats import NAMES
+
+    if options.format not in (None, *NAMES):
+        made.error(f"--format {options.format}: expected one of {', '.join(NAMES)}")
+    tried: dict[str, int] = {}
+    for seed in plan:
+        kind = options.format or NAMES[seed % len(NAMES)]
+        count, failure = explore(kind, seed, options.each, options.keep)
+        if failure:
+            return plan.failed(failure)
+        tried[kind] = tried.get(kind, 0) + count
+    return plan.ended(", ".join(f"{kind} {count}" for kind, count in sorted(tried.items())))
+
+
+if __name__ == "__main__":
+    sys.exit(main())
