@@ -277,7 +277,10 @@ class Observer:
         return self.seen
 
     def _nest(self, moment: _Moment, nested: frozenset[int]) -> None:
-        """Request each handler that is not nested yet in a moment; continue in the deepest one of each level."""
+        """Request, at a moment, each handler that is not nested yet.
+
+        Continue in the same way at the deepest moments of the handler that uses the most stack at each level.
+        """
         best: dict[int, tuple[int, list[_Moment], int]] = {}
         """By level: bytes of stack, the handler's deepest moments, handler."""
         for lead in LEADS:

@@ -18,11 +18,11 @@ SENSORS: Final = range(8, 16)
 
 
 class InputLog:
-    """Camera lines and sensor levels by cycle: recorded in the present, returned when the past is run again."""
+    """Camera lines and sensor levels by cycle: recorded in the first run, returned during a replay."""
 
     def __init__(self, machine: Machine) -> None:
         self.is_recording = True
-        """Whether inputs of the present are logged; false once their past will not be run again."""
+        """Whether new inputs are logged; false once no replay can need them."""
         self._events: Final = machine.events
         self._ir: Final = machine.board.ir
         self._lines: Final[dict[int, NDArray[np.uint8]]] = {}

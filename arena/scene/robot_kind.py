@@ -44,7 +44,7 @@ class Drive:
     lever_cm: float
     """Lever of both forces for turning."""
     noise: float = 0.0
-    """Share of the values, drawn every `noise_period_s` from minus to plus this share."""
+    """Noise of the drive: factors from 1 - noise to 1 + noise, drawn again every `noise_period_s`."""
     axle_cm: float = 0.0
     ahead: float = 0.0
     turn: float = 0.0

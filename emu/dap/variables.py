@@ -204,7 +204,7 @@ class SourceFiles:
         self._finder: Final = finder
 
     def path(self, file: str) -> Path:
-        """Return the path of `file` of the line table; as it is there if the file does not exist."""
+        """Return the path of a file that the line table names; the name itself if the file does not exist."""
         return self._finder.find(file) or Path(file)
 
     def row(self, file: str) -> Row:

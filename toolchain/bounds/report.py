@@ -67,7 +67,7 @@ class Bound:
 
     @property
     def stack_is_known(self) -> bool:
-        """Whether only loop bounds are missing, which leave the stack bounded."""
+        """Whether the stack has a bound: missing loop bounds alone do not unbound it."""
         return not self.unbounded_stack
 
     @property

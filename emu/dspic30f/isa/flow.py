@@ -1,4 +1,4 @@
-"""Flows: requests of an instruction to the sequencer to do other than continue with the next word.
+"""Flows: requests of an instruction to the sequencer not to continue with the next word.
 
 A row's function ``does`` returns a flow or None. Addresses are program addresses (23 bits, even). A target or count may
 be a static int or a builder value. Only the sequencer changes PC, REPEAT and DO state (isa.md §7).

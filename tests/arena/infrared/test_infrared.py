@@ -290,8 +290,7 @@ def test_a_share_of_the_frames_is_lost_as_a_whole(scene: Scene) -> None:
 
 
 def test_a_robot_without_battery_is_at_rest_and_dark(scene: Scene, tmp_path: Path) -> None:
-    """A robot whose battery is empty from a given second on stops and turns its LEDs off; the record has no fault of
-    it."""
+    """A robot whose battery becomes empty stops and turns its LEDs off. The record contains no fault of the robot."""
     sender = built(tmp_path, SENDER, "sender")
     scene = scene.with_values(start__off=[[1, 0.2]], start__silent_s=0.1)
     channel = OpticalChannel.of(scene)

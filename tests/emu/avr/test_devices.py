@@ -155,7 +155,10 @@ def test_the_comparator_starts_a_conversion(machine: Machine) -> None:
 
 
 def test_eeprom(machine: Machine) -> None:
-    """A byte is written within four cycles after EEMPE, takes 26,368 cycles, and outlasts a reset; else nothing is."""
+    """A write of EEPE within four cycles after EEMPE writes a byte in 26,368 cycles; a later one has no effect.
+
+    The byte survives a reset.
+    """
     m = run(machine, """
         EEAR = 5; EEDR = 0x5A; EECR |= 4; EECR |= 2; TCCR1B = 1; while (EECR & 2) ; took = TCNT1;
         EEAR = 6; EEDR = 0x77; EECR |= 2;

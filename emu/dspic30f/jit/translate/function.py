@@ -411,7 +411,7 @@ class Translator(FunctionFrame):
         self.v.new_block()
         self.v.set("cycle", self.v.get("cycle") + taken_cost(step))
         self.counter.add_cycles(step.pc, taken_cost(step))
-        if step.target != step.next_pc:  # a branch to the next instruction cannot be seen to be taken
+        if step.target != step.next_pc:  # whether a branch to the next instruction is taken makes no difference
             self.counter.count_taken(step.pc)
 
     def _flow(self, step: Step, flow: Flow, cycles: Number, mask: int) -> None:

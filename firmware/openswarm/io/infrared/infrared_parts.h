@@ -89,7 +89,7 @@ uint8 neighbours_count(void);
 
 /* ---- reflections.c: proximity between frames ---- */
 bool reflections_init(void);           /* false: no memory */
-void reflections_lit(scan raw);        /* reading with this robot's emitters on for two scans */
+void reflections_lit(scan raw);        /* handles a reading for which the own emitters were on for two scans */
 void reflections_use(void);            /* no other robot sent light meanwhile: reports the reflections */
 
 #endif
