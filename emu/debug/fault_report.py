@@ -164,7 +164,7 @@ def _case_of_stop(machine: Machine, inspector: Inspector, stop: Stop) -> _Case |
     in_trap = bool(machine.peek("CORCON") & IPL3)
     if stop.reason == "breakpoint":
         return _case_of_debugger_word(machine, inspector, stop, in_trap)
-    if inspector.function_name(stop.pc) == STOP_FUNCTION and stop.reason == "halt":
+    if inspector.function_name(stop.pc) == STOP_FUNCTION and machine.is_asleep:
         called = {one.function for one in inspector.frames()}
         if checkpoints.trap is not None and (in_trap or TRAP_FUNCTION in called):
             return _case_of_trap(machine, checkpoints.trap)

@@ -18,6 +18,7 @@ from emu.chips.dspic30f6014a import DSPIC30F6014A
 from emu.dspic30f.core import Core
 from emu.dspic30f.engines import make_engine
 from emu.dspic30f.exceptions.faults import RESTART, DebuggerWord, DeviceReset, Violation
+from emu.dspic30f.exceptions.power import DRAIN_CYCLES
 from emu.dspic30f.state.state import PC_MASK, RUN, W15_INITIALISED
 from emu.image.model import Image
 from emu.machine import saved_state
@@ -119,8 +120,10 @@ class Machine(StateAccess):
             self.state.at["cpu.cycle"],
             self.events.deadline_index,
             self.state.at["cpu.mode"],
+            self.record.fields["cpu.slept"].index,
         )
-        """Hot state of `run_until`: the 64-bit view of the record, and the indices of cycle, deadline and mode."""
+        """Hot state of `run_until`: the 64-bit view of the record, and the indices of cycle, deadline, mode, and of the
+        cycle in which the CPU stopped."""
         self.memory_observer = observer(self) if observer is not None else None
         self.runner = make_engine(engine, self.core, self._pc_hooks.by_address, self._pc_hooks.filters)
         self.reset("POR")
@@ -202,8 +205,13 @@ class Machine(StateAccess):
     def run_until(self, cycle: int) -> Stop | None:
         """Run to the first instruction boundary at or after `cycle`. Return the stop that ended the run earlier, or
         None."""
-        u64, now, deadline, mode = self._clock
-        if u64[now] < cycle < u64[deadline] < NEVER and self.record.u16[mode] != RUN and not self._interrupt:
+        u64, now, deadline, mode, slept = self._clock
+        if (
+            u64[now] < cycle < u64[deadline] < NEVER
+            and self.record.u16[mode] != RUN
+            and cycle <= u64[slept] + DRAIN_CYCLES
+            and not self._interrupt
+        ):
             u64[now] = u64[self.events.now_index] = cycle  # the CPU sleeps, and no event is due before `cycle`
             return None
         state, sequencer, engine, hooks = self.state, self.core.sequencer, self.runner, self._pc_hooks.by_address
@@ -408,7 +416,7 @@ class Machine(StateAccess):
         not change the run, because the events of the present cycle precede the accesses of the next instruction. If
         the CPU sleeps, the events due in the present cycle are left to the next run. Raises DeviceReset.
         """
-        u64, now, _, mode = self._clock
+        u64, now, _, mode, _ = self._clock
         cycle = u64[now]
         self.events.arrive(cycle if self.record.u16[mode] == RUN else cycle - 1)
         u64[self.events.now_index] = cycle

@@ -14,7 +14,9 @@ from emu.system.rules import Rule
 
 NO_RULE: Final = Rule(None)
 DRAIN_CYCLES: Final = 1_000_000
-"""Cycles that devices run after the CPU stops without an enabled wake-up source, so that transmitters can drain."""
+"""Cycles that devices run after the CPU stops without an enabled wake-up source, so that transmitters can drain.
+
+If an event is due later than that, the run ends after exactly these cycles, wherever its slices end."""
 
 
 class Sleeping(Enum):
@@ -95,13 +97,16 @@ class PowerSaving:
             due = events.deadline
             if due < limit:
                 due = events.next_due()
-            if limit <= due < NEVER:
-                state.cycle = max(state.cycle, limit)
-                return Sleeping.GOES_ON
-            if due == NEVER or (due > state.record.u64[self._slept] + DRAIN_CYCLES and self._is_final()):
+            drained = state.record.u64[self._slept] + DRAIN_CYCLES
+            is_final = drained < due < NEVER and drained < limit and self._is_final()
+            if is_final:
+                state.cycle = max(state.cycle, drained)
+            if is_final or due == NEVER:
                 events.settle(state.cycle)
                 return Sleeping.FOR_EVER
-            state.cycle = max(state.cycle, due)
+            state.cycle = max(state.cycle, min(due, limit))
+            if limit <= due:
+                return Sleeping.GOES_ON
 
     def _is_final(self) -> bool:
         """Whether no enabled source can wake the CPU any more."""

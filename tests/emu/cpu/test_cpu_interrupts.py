@@ -10,6 +10,7 @@ from itertools import pairwise
 
 import pytest
 
+from emu.dspic30f.exceptions.power import DRAIN_CYCLES
 from tests.emu.cpu.cpu_rig import RAM, STACK, TABLE, Rig
 
 ISR = "isr: nop\nstay: bra stay"
@@ -342,6 +343,16 @@ def test_idling_beside_a_timer_that_interrupts_nobody_halts(engine: str) -> None
     stop = rig.run(20_000_000)
     assert (stop.reason, stop.pc) == ("halt", rig.labels["end"])
     assert stop.cycle <= 1_001_000
+
+
+@pytest.mark.parametrize("part", [70_000, 999_999, 30_000_000])
+def test_the_cycle_of_a_halt_does_not_depend_on_the_parts_of_a_run(engine: str, part: int) -> None:
+    """The next event, the period of a timer with a prescaler of 256, is due after 16.8 million cycles."""
+    rig = Rig("mov w0, 0x102\nmov w1, 0x104\npwrsav #1\nend: nop", engine, w0=0xFFFF, w1=0x8030)
+    stop = rig.machine.run(cycles=part)
+    while stop.reason == "limit":
+        stop = rig.machine.run(cycles=part)
+    assert (stop.reason, stop.pc, stop.cycle) == ("halt", rig.labels["end"], 2 + DRAIN_CYCLES)
 
 
 def test_a_timer_interrupt_comes_with_its_period(engine: str) -> None:
