@@ -95,15 +95,15 @@ class Digest:
 def digest_of(record: Path) -> Digest:
     """Return the digest of the file of a trial. Raises RecordError."""
     trial = read_trial(record)
-    columns = {name: hashlib.sha256(_plain(values)).hexdigest() for name, values in trial.columns.items()}
+    columns = {name: hashlib.sha256(_column_bytes(values)).hexdigest() for name, values in trial.columns.items()}
     whole, start = hashlib.sha256(record.read_bytes()).hexdigest(), hashlib.sha256()
     samples = int(np.searchsorted(trial.times, BEGINNING_S + 1e-3))
     for name, values in sorted(trial.columns.items()):
-        start.update(f"{name} ".encode() + _plain(values[:samples]))
+        start.update(f"{name} ".encode() + _column_bytes(values[:samples]))
     return Digest(whole, columns, trial.about.get("versions") or {}, start.hexdigest())
 
 
-def _plain(values: Any) -> bytes:
+def _column_bytes(values: Any) -> bytes:
     """Return the values of a column as bytes that are equal for equal values."""
     if isinstance(values, np.ndarray):
         return f"{values.dtype.str} ".encode() + values.tobytes()

@@ -79,7 +79,7 @@ class Plan:
 
     def key(self) -> dict[str, Any]:
         """Return everything that a trial depends on except its seed; it is stored in every file."""
-        scene = _plain(json.loads(json.dumps(asdict(self.scene))))
+        scene = _without_nan(json.loads(json.dumps(asdict(self.scene))))
         own = {name: _digest(path) for name, path in self.controllers}
         return ({"controllers_sha256": own} if own else {}) | {
             "scene": scene,
@@ -93,12 +93,12 @@ class Plan:
         }
 
 
-def _plain(value: Any) -> Any:
+def _without_nan(value: Any) -> Any:
     """Replace nan by None in a JSON value, so that equal values compare equal."""
     if isinstance(value, dict):
-        return {key: _plain(one) for key, one in value.items()}
+        return {key: _without_nan(one) for key, one in value.items()}
     if isinstance(value, list):
-        return [_plain(one) for one in value]
+        return [_without_nan(one) for one in value]
     return None if value != value else value
 
 
@@ -224,12 +224,12 @@ def check_folder(plan: Plan, folder: Path) -> dict[str, Any] | None:
         return None
     before, key = read_manifest(folder), plan.key() | {"seed": plan.seed}
     if before["key"] != key:
-        raise RecordError(f"{folder}: holds another run (different {', '.join(_changed(before['key'], key))}); "
+        raise RecordError(f"{folder}: holds another run (different {', '.join(_differing_parts(before['key'], key))}); "
                           "choose another --out")  # fmt: skip
     return before
 
 
-def _changed(before: dict[str, Any], now: dict[str, Any]) -> list[str]:
+def _differing_parts(before: dict[str, Any], now: dict[str, Any]) -> list[str]:
     """Return names of the parts in which two keys differ."""
     different = [name for name in now if name != "versions" and before.get(name) != now[name]]
     old, new = before["versions"], now["versions"]

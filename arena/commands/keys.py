@@ -105,7 +105,7 @@ def _range(one: Key) -> str:
     return f"{one.minimum:g} or more" if one.maximum is None else f"{one.minimum:g} to {one.maximum:g}"
 
 
-def _shown(value: Any) -> str:
+def _default_text(value: Any) -> str:
     """Return a default as a scene file would have it."""
     if value is None:
         return "(see above)"
@@ -114,7 +114,7 @@ def _shown(value: Any) -> str:
 
 def _cells(table: str) -> list[tuple[str, str, str, str]]:
     """Return key, type with unit, range and default of every key of a table."""
-    return [(one.key, f"{one.type}, {one.unit}" if one.unit else one.type, _range(one), _shown(one.default))
+    return [(one.key, f"{one.type}, {one.unit}" if one.unit else one.type, _range(one), _default_text(one.default))
             for one in keys_of(table)]  # fmt: skip
 
 

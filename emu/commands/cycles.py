@@ -117,10 +117,10 @@ def _interval(image: Image, text: str) -> tuple[str, int, int]:
     begin, separator, end = text.partition("..")
     if not begin or not separator or not end:
         raise CommandError(f"--interval {text}: expected two places, A..B")
-    return text, _place(image, begin), _place(image, end)
+    return text, _address_of(image, begin), _address_of(image, end)
 
 
-def _place(image: Image, text: str) -> int:
+def _address_of(image: Image, text: str) -> int:
     """Return the address of a name, an address or FILE:LINE. Raises CommandError."""
     file, colon, line = text.rpartition(":")
     if not colon or not line.isdecimal():

@@ -283,7 +283,7 @@ def _by_name(found: list[Piece]) -> list[Piece]:
     return sorted(whole, key=lambda piece: (-piece.rom - piece.ram, piece.name))
 
 
-def _near(path: str) -> str:
+def _relative(path: str) -> str:
     """Return a path relative to the current folder, if it lies below it."""
     near = os.path.relpath(path)
     return path if near.startswith("..") or not path.startswith("/") else near
@@ -308,7 +308,8 @@ def static_text(facts: dict[str, Any], symbols: int) -> str:
         lines.append("(no debug information: build with -g for sizes by source file)")
     for title, key in tables:
         lines += ["", f"{title:48} {'ROM':>7} {'RAM':>7}"]
-        lines += [f"{_fitted(_near(name)):48} {size['rom']:7,} {size['ram']:7,}" for name, size in facts[key].items()]
+        lines += [f"{_fitted(_relative(name)):48} {size['rom']:7,} {size['ram']:7,}"
+                  for name, size in facts[key].items()]  # fmt: skip
     if symbols > 0:
         lines += ["", f"{'symbol':48} {'ROM':>7} {'RAM':>7}"]
         shown = facts["symbols"][:symbols]

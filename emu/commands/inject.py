@@ -91,7 +91,7 @@ def run(options: argparse.Namespace) -> int:
             raise CommandError(f"--only: the campaign has trials 0 to {campaign.trials - 1}")
         print(json.dumps(asdict(_trials(image, campaign).run(options.only)), indent=2))
         return DONE
-    outcomes = _all(image, campaign, options)
+    outcomes = _all_outcomes(image, campaign, options)
     if options.out:
         with atomic_text_file(options.out) as stream:
             writer = csv.writer(stream, lineterminator="\n")
@@ -105,7 +105,7 @@ def run(options: argparse.Namespace) -> int:
     return DONE
 
 
-def _all(image: Image, campaign: Campaign, options: argparse.Namespace) -> list[Outcome]:
+def _all_outcomes(image: Image, campaign: Campaign, options: argparse.Namespace) -> list[Outcome]:
     """Return every trial's outcome, sorted by trial number. Trials in the state file are not run again."""
     header = {"image": fingerprint(image), "campaign": campaign.fingerprint}
     done = (

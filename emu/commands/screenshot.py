@@ -78,7 +78,7 @@ def run(options: argparse.Namespace) -> int:
     machine.load(image)
     set_up(machine, options)
     limit = max(1, int(options.seconds * Fraction(machine.peripherals.fcy)))
-    place = _place(machine, options) if options.buffer else None
+    place = _buffer_address(machine, options) if options.buffer else None
     stop = machine.advance(limit) or machine.stopped("limit")
     pixels = _sensor(machine) if place is None else _captured(machine, place, options)
     write_picture(options.output, pixels, options.enlarge)
@@ -95,7 +95,7 @@ def run(options: argparse.Namespace) -> int:
     return DONE
 
 
-def _place(machine: Machine, options: argparse.Namespace) -> int:
+def _buffer_address(machine: Machine, options: argparse.Namespace) -> int:
     """Return the data address of the picture buffer, all of which must be in RAM."""
     try:
         address = int(options.buffer, 0)

@@ -162,7 +162,7 @@ class ChangeLog:
 
     def after_native_run(self) -> None:
         """Log what a native boundary has changed before an address without native code, then deliver all entries."""
-        self._look(BOUNDARY)
+        self._log_changes(BOUNDARY)
         self.after_run()
 
     def _after_instruction(self, execute: Callable[[], None]) -> Callable[[], None]:
@@ -174,7 +174,7 @@ class ChangeLog:
             try:
                 execute()
             finally:
-                self._look(site)
+                self._log_changes(site)
 
         return watched
 
@@ -184,11 +184,11 @@ class ChangeLog:
             try:
                 return boundary(limit)
             finally:
-                self._look(BOUNDARY)
+                self._log_changes(BOUNDARY)
 
         return watched
 
-    def _look(self, site: int) -> None:
+    def _log_changes(self, site: int) -> None:
         """Log the numbers that have changed, and deliver them."""
         stores = self._stores[:]
         self._stores.clear()

@@ -73,7 +73,7 @@ class BootSession:
         while True:
             self._line.drop()
             self._line.write(HELLO)
-            heard = self._heard(HELLO_SECONDS)
+            heard = self._receive(HELLO_SECONDS)
             if heard[-1:] == DONE and heard[-2:-1]:
                 loader = LOADERS.get(heard[-2])
                 if loader is not None and HELLO in heard:  # an echoed 'K' of a row would pass for an answer
@@ -88,7 +88,7 @@ class BootSession:
                 also = f"; {others} bytes of something else came" if others else ""
                 raise RobotError(f"no boot loader answered within {seconds:g} s{also}: press the robot's reset button")
 
-    def _heard(self, seconds: float) -> bytes:
+    def _receive(self, seconds: float) -> bytes:
         """Return the bytes received within a time; return earlier after a known loader type and 'K'."""
         heard = b""
         limit = self._line.now() + seconds

@@ -75,7 +75,7 @@ class SerialPort:
         os.close(self._file)
 
     @contextlib.contextmanager
-    def _named(self) -> Iterator[None]:
+    def _naming_the_port(self) -> Iterator[None]:
         """Return an error of the operating system with the port's name added."""
         try:
             yield
@@ -89,7 +89,7 @@ class SerialPort:
         while data:
             if not select.select([], [self._file], [], _STUCK_SECONDS)[1]:
                 raise OSError(f"{self.device} takes no bytes: its other end does not read, or the radio is gone")
-            with contextlib.suppress(BlockingIOError), self._named():
+            with contextlib.suppress(BlockingIOError), self._naming_the_port():
                 data = data[os.write(self._file, data) :]
 
     def read(self, seconds: float) -> bytes:
@@ -97,7 +97,7 @@ class SerialPort:
         if not select.select([self._file], [], [], max(seconds, 0.0))[0]:
             return b""
         try:
-            with self._named():
+            with self._naming_the_port():
                 byte = os.read(self._file, 1)
         except BlockingIOError:
             return b""

@@ -73,7 +73,7 @@ def _built(source: Path, flags: tuple[str, ...], folders: pytest.TempPathFactory
     import emu
 
     if source.is_dir():
-        return _made(source)
+        return _build_project(source)
     if not source.exists():
         raise pytest.UsageError(f"{source} does not exist")
     if source.suffix != ".c":
@@ -81,7 +81,7 @@ def _built(source: Path, flags: tuple[str, ...], folders: pytest.TempPathFactory
     return emu.build(source, flags=flags, output=folders.mktemp("firmware") / f"{source.stem}.elf")
 
 
-def _made(folder: Path) -> Path:
+def _build_project(folder: Path) -> Path:
     """Build a project with its Makefile and return the image. A lock serialises the builds of several processes."""
     from emu import BuildError
 

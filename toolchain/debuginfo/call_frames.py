@@ -122,8 +122,8 @@ def _after(state: CallFrameState, mi: MI, interrupt: bool) -> CallFrameState:
     if text == "pop.s":
         return state.without({r for r, place in state.saved if place is None})
     if state.frame is not None:
-        return _pushed(state, mi, interrupt) if _pushes_saved(mi) else replace(state, depth=state.depth + _by(mi))
-    change = _by(mi)
+        return _pushed(state, mi, interrupt) if _pushes_saved(mi) else replace(state, depth=state.depth + _growth(mi))
+    change = _growth(mi)
     if change > 0:
         return _pushed(state, mi, interrupt)
     after = replace(state, depth=state.depth + change)
@@ -131,7 +131,7 @@ def _after(state: CallFrameState, mi: MI, interrupt: bool) -> CallFrameState:
     return after.without(back) if back else after
 
 
-def _by(mi: MI) -> int:
+def _growth(mi: MI) -> int:
     """Bytes that an instruction adds to the stack."""
     if mi.op == "asm":
         return sum(_asm_change(line)[0] for line in mi.text.split("\n"))
@@ -162,13 +162,13 @@ def _asm_change(line: str) -> tuple[int, list[int]]:
 
 def _pushes_saved(mi: MI) -> bool:
     """Whether an instruction is a push of the prologue, which has no source line."""
-    return mi.line is None and _by(mi) > 0
+    return mi.line is None and _growth(mi) > 0
 
 
 def _pushed(state: CallFrameState, mi: MI, interrupt: bool) -> CallFrameState:
     registers = _registers(mi, "push", 0)
     kept = {r: state.depth + 2 * k for k, r in enumerate(registers) if interrupt or r not in SCRATCH}
-    return replace(state.with_saved(dict(kept)), depth=state.depth + _by(mi))
+    return replace(state.with_saved(dict(kept)), depth=state.depth + _growth(mi))
 
 
 def _popped(mi: MI) -> list[int]:

@@ -57,7 +57,7 @@ def _refusal(name: str) -> Rewrite:
 
 
 def _space(arguments: list[str], number: int) -> list[str]:
-    kind = _plain(arguments[0]) if len(arguments) == 1 else ""
+    kind = _without_underscores(arguments[0]) if len(arguments) == 1 else ""
     if kind not in _SPACES:
         return _refused(f"attribute space({', '.join(arguments)})")
     section = [f'__section__("{_SPACES[kind]}.0{number}")'] if _SPACES[kind] else []
@@ -68,7 +68,7 @@ def _interrupt(arguments: list[str], number: int) -> list[str]:
     """`interrupt(irq(N), altirq(N), save(a, b), preprologue("text"), shadow, auto_psv, no_auto_psv)`."""
     out = ['__annotate__("interrupt")', "__used__"]
     for argument in arguments:
-        name, inside = _parts(argument)
+        name, inside = _name_and_arguments(argument)
         if name in ("irq", "altirq"):
             out += _valued(name)(inside, number)
         elif name == "save":
@@ -153,7 +153,7 @@ def _replace(text: str, rules: dict[str, Rewrite], unchanged: re.Pattern[str] | 
         number += 1
         replaced = []
         for attribute in split(_MARKER.sub(" ", text[start:end])):
-            name, arguments = _parts(attribute)
+            name, arguments = _name_and_arguments(attribute)
             if name == "sfr" and arguments:
                 registers += _register(text, token.start(), end, arguments[0])
             rule = rules.get(name)
@@ -181,16 +181,16 @@ def split(text: str) -> list[str]:
     return [" ".join(part.split()) for part in out if part.strip()]
 
 
-def _plain(name: str) -> str:
+def _without_underscores(name: str) -> str:
     """A name without the underscores that may surround attributes and their arguments."""
     name = name.strip()
     return name[2:-2] if len(name) > 4 and name.startswith("__") and name.endswith("__") else name
 
 
-def _parts(attribute: str) -> tuple[str, list[str]]:
+def _name_and_arguments(attribute: str) -> tuple[str, list[str]]:
     """Name and arguments of an attribute."""
     name, bracket, inside = attribute.partition("(")
-    return _plain(name), split(inside.rstrip()[:-1]) if bracket else []
+    return _without_underscores(name), split(inside.rstrip()[:-1]) if bracket else []
 
 
 def _list_after(text: str, at: int) -> tuple[int, int] | None:

@@ -153,24 +153,24 @@ def _sums(place: int, held: list[int], rows: list[dict[ValueWord, int]]) -> Iter
     """Yield candidate sums: one value plus a number, or two values, one of them with a factor, plus a number."""
     moving = [part for part in rows[0] if len({row[part] for row in rows}) > 1]
     for a in moving:
-        number = _rest(held, [row[a] for row in rows])
+        number = _constant_difference(held, [row[a] for row in rows])
         if number is not None:
             yield Invariant(place, ((1, a),), number)
     for n, a in enumerate(moving):
         for k, b in enumerate(moving):
             for factor in FACTORS:
                 if n < k or (n > k and factor != 1):
-                    number = _rest(held, [row[a] + factor * row[b] for row in rows])
+                    number = _constant_difference(held, [row[a] + factor * row[b] for row in rows])
                     if number is not None:
                         yield Invariant(place, ((1, a), (factor, b)), number)
     for a in moving:
         for factor in FACTORS[1:]:
-            number = _rest(held, [factor * row[a] for row in rows])
+            number = _constant_difference(held, [factor * row[a] for row in rows])
             if number is not None:
                 yield Invariant(place, ((factor, a),), number)
 
 
-def _rest(held: list[int], sums: list[int]) -> int | None:
+def _constant_difference(held: list[int], sums: list[int]) -> int | None:
     """Return the difference between contents and sums if it is the same at all visits, else None."""
     rests = {(number - total) & 0xFFFF for number, total in zip(held, sums, strict=True)}
     return rests.pop() if len(rests) == 1 else None

@@ -73,7 +73,7 @@ class Controller:
         if senses.seen == OBJECT:
             self._seen_at = senses.seconds
             if front > TOUCH:
-                self._state = self._look
+                self._state = self._turn_once
                 return 0.0, 0.0
             return FAST, FAST
         lost = senses.seconds - self._seen_at
@@ -97,7 +97,7 @@ class Controller:
         self._state = self._search
         return 0.0, 0.0
 
-    def _look(self, senses: Senses, elapsed: float) -> tuple[float, float]:
+    def _turn_once(self, senses: Senses, elapsed: float) -> tuple[float, float]:
         """Turn once on the spot: move on if the goal is in sight, else push."""
         if senses.seen == GOAL:
             self._state = self._pass
@@ -112,7 +112,7 @@ class Controller:
         if senses.seen == OBJECT or max(near[0], near[7]) > NEAR:
             self._seen_at = senses.seconds
         if senses.seen == GOAL or elapsed > PUSH_S:
-            self._state = self._look
+            self._state = self._turn_once
         elif senses.seconds - self._seen_at > LOST_S:
             self._state = self._search
         steer = 10.0 * max(-0.3, min(near[0] + near[1] - near[7] - near[6], 0.3))

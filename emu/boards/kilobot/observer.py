@@ -106,16 +106,16 @@ class KilobotObserver:
         """Yield the states of LED and motors that have lasted long enough at a cycle."""
         due = sorted((since, kind) for kind, (since, _) in self._waiting.items() if cycle - since >= SETTLED)
         for since, kind in due:
-            yield from self._settled(since, kind)
+            yield from self._report_state(since, kind)
 
     def final_reports(self) -> Iterator[Report]:
         """Yield the reports that are pending at the end of a run: the last states, and an incomplete UART line."""
         for since, kind in sorted((since, kind) for kind, (since, _) in self._waiting.items()):
-            yield from self._settled(since, kind)
+            yield from self._report_state(since, kind)
         if self._text:
             yield Report(self._text_at, "uart", {"text": self._text.decode("latin-1")})
 
-    def _settled(self, since: int, kind: str) -> Iterator[Report]:
+    def _report_state(self, since: int, kind: str) -> Iterator[Report]:
         state = self._waiting.pop(kind)[1]
         if state == self._reported[kind]:
             return

@@ -48,22 +48,22 @@ def filter_of(inspector: Inspector, condition: str, address: int | None = None) 
 def _comparison(inspector: Inspector, part: list[Token], address: int | None) -> Comparison | None:
     """Return one comparison, None if it is of another form."""
     if part[0] == ("sign", "!"):
-        return _made(inspector, part[1:], "==", "0", address)
+        return _literal_comparison(inspector, part[1:], "==", "0", address)
     places = [number for number, (kind, text) in enumerate(part) if kind == "sign" and text in OPERATORS]
     if not places:
-        return _made(inspector, part, "!=", "0", address)
+        return _literal_comparison(inspector, part, "!=", "0", address)
     operator, left, right = part[places[0]][1], part[: places[0]], part[places[0] + 1 :]
     if left[0][0] == "number":
         left, right, operator = right, left, _MIRRORED.get(operator, operator)
     match right:
         case [("number", literal)]:
-            return _made(inspector, left, operator, literal, address)
+            return _literal_comparison(inspector, left, operator, literal, address)
         case [("sign", "-"), ("number", literal)]:
-            return _made(inspector, left, operator, "-" + literal, address)
+            return _literal_comparison(inspector, left, operator, "-" + literal, address)
     return None
 
 
-def _made(
+def _literal_comparison(
     inspector: Inspector, operand: list[Token], operator: str, literal: str, address: int | None
 ) -> Comparison | None:
     """Return the comparison of an operand with a literal, if C compares the two as mathematics does."""

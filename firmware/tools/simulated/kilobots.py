@@ -70,7 +70,7 @@ class Kilobots:
             self.close()
             raise
         for index in range(len(robots)):
-            self._look_at(index)
+            self._update_links(index)
 
     def _add(self, robot: Robot) -> None:
         machine = Kilobot(robot.image)
@@ -84,7 +84,7 @@ class Kilobots:
         if self._library.air_join(self._air, machine.handle, int(robot.on_at * HZ)) < 0:
             raise ValueError(f"{len(self.robots)} robots are too many")
 
-    def _look_at(self, moved: int) -> None:
+    def _update_links(self, moved: int) -> None:
         for other in range(len(self.robots)):
             distance = math.dist(self.places[moved], self.places[other])
             heard = distance <= REACH_MM
@@ -95,7 +95,7 @@ class Kilobots:
     def move(self, robot: int, x: float, y: float) -> None:
         """Move a robot to a position in mm, at once."""
         self.places[robot] = (x, y)
-        self._look_at(robot)
+        self._update_links(robot)
 
     def flash(self, robot: int, after_us: float) -> None:
         """Inject a noise pulse into one robot after some us."""

@@ -147,7 +147,7 @@ def preemption(robot: Robot, image: Path, threads: int) -> int:
             taken = _follow(machine, lambda pc: pc in span)
             if pointer(machine, "os_running") != before:
                 seen.append(taken)
-        return _settled(seen)
+        return _undisturbed_window(seen)
     finally:
         machine.close()
 
@@ -161,12 +161,12 @@ def yielding(robot: Robot, image: Path) -> int:
         for _ in range(ATTEMPTS):
             machine.run_to(nop)
             seen.append(_follow(machine, nop.__eq__) - robot.loop)
-        return _settled(seen)
+        return _undisturbed_window(seen)
     finally:
         machine.close()
 
 
-def _settled(seen: list[int]) -> int:
+def _undisturbed_window(seen: list[int]) -> int:
     """Return the window that no other interrupt disturbs: the minimum, seen more than once."""
     settled = [taken for taken in seen[SETTLING:] if taken < PATIENCE]
     if not settled or settled.count(min(settled)) < 2:
@@ -182,7 +182,7 @@ def sending(robot: Robot, image: Path, **scenario: int) -> int:
         for _ in range(ATTEMPTS):
             machine.run_to("latency_send")
             seen.append(_follow(machine, machine.return_address().__eq__))
-        return _settled(seen)
+        return _undisturbed_window(seen)
     finally:
         machine.close()
 
@@ -195,7 +195,7 @@ def reaching(robot: Robot, image: Path, place: str, **scenario: int) -> int:
         for _ in range(ATTEMPTS):
             machine.run_to("latency_send")
             seen.append(_follow(machine, machine.symbols[place].__eq__))
-        return _settled(seen)
+        return _undisturbed_window(seen)
     finally:
         machine.close()
 

@@ -34,15 +34,15 @@ class Interval:
 
     def __add__(self, other: Value) -> Value:
         lo, hi = extremes(other)
-        return interval(self.lo + lo, self.hi + hi, ram=self._moved(other))
+        return interval(self.lo + lo, self.hi + hi, ram=self._stays_in_ram(other))
 
     __radd__ = __add__
 
     def __sub__(self, other: Value) -> Value:
         lo, hi = extremes(other)
-        return interval(self.lo - hi, self.hi - lo, ram=self._moved(other))
+        return interval(self.lo - hi, self.hi - lo, ram=self._stays_in_ram(other))
 
-    def _moved(self, by: Value) -> bool:
+    def _stays_in_ram(self, by: Value) -> bool:
         """Whether all members of the set plus `by` are RAM addresses.
 
         A constant that is a PSV window address in 16 bits, as every negative number is, may be the base address and

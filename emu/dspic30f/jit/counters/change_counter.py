@@ -49,7 +49,7 @@ class ChangeCounter(CycleCounter):
         here = head.load(pointer(head, self._offset["cpu.pc"]), 32)
         head.end(f"br i1 {truth(changed)}, label %{check}, label %{on}")
         head.start(check)
-        leaves = _look(head, cycle, here | BOUNDARY << 32, 0)
+        leaves = _emit_log_call(head, cycle, here | BOUNDARY << 32, 0)
         head.end(f"br i1 {leaves}, label %{leave}, label %{on}")
         head.start(leave)
         head.end(f"ret i64 {CHANGED}")
@@ -72,7 +72,7 @@ class ChangeCounter(CycleCounter):
 
         Return the truth, as IR operand, that native code must return to Python.
         """
-        return _look(self._e, cycle, next_pc | site << 32, self._hits)
+        return _emit_log_call(self._e, cycle, next_pc | site << 32, self._hits)
 
     def definitions(self) -> str:
         """Return the IR of the function that compares all watched numbers and logs the changes."""
@@ -135,7 +135,7 @@ class ChangeBoundaryCounter(BoundaryCounter):
     returns_after_retfie = True
 
 
-def _look(e: Emitter, cycle: Number, where: Number, hits: Number) -> str:
+def _emit_log_call(e: Emitter, cycle: Number, where: Number, hits: Number) -> str:
     numbers = ", ".join(f"i64 {wide(one)}" for one in (cycle, where, hits))
     return e.let(f"call i1 @check_changes(ptr %rec, ptr %x.log, {numbers})", bit=True).text
 
