@@ -1,25 +1,29 @@
-"""`emu run --board kilobot`: options of the Kilobot, an ATmega328P with its own engine, and the run with its output."""
+"""The board `kilobot` of `emu run` and `emu profile`: options of an ATmega328P with its own engine, run and profile."""
 
 from __future__ import annotations
 
 import argparse
 import json
 import sys
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from emu.boards.kilobot.messages import MOST_UID, TYPES
 from emu.host.command import CommandError, Parser
 from emu.host.exit_status import DONE, FAULT, FAULT_AS_STATUS, INTERRUPTED, LIMIT_AS_STATUS
 
+if TYPE_CHECKING:
+    from emu.profile.cycle_shares import CodeLocations, Profile
+
 BOARD: Final = "kilobot"
 OWN: Final = ("ohc", "uid")
 """Options of the Kilobot alone."""
-SHARED: Final = ("image", "board", "seconds", "cycles", "json", "exit_code", "cache")
-"""Options of `emu run` that apply to a Kilobot, too."""
+SHARED: Final = ("image", "board", "seconds", "cycles", "json", "exit_code", "cache", "skip", "group", "top", "lines",
+                 "callgrind")  # fmt: skip
+"""Options of the commands that apply to a Kilobot, too."""
 
 
 def add_options(made: Parser) -> None:
-    """Add the options of the Kilobot to the parser of `emu run`."""
+    """Add the options of the Kilobot to a command's parser."""
     made.add_argument("--ohc", choices=("none", *TYPES), help="kilobot: overhead controller's message (default run)")
     made.add_argument("--uid", metavar="N", type=_uid, help="kilobot: its UID, 0 to 65535 (default 0)")
 
@@ -37,15 +41,38 @@ def refuse_options(options: argparse.Namespace) -> None:
             raise CommandError(f"--{name} needs --board {BOARD}")
 
 
+def refuse_other_options(options: argparse.Namespace, made: Parser) -> None:
+    """Raise CommandError for an option of the parser `made` that does not apply to a Kilobot."""
+    given = vars(options)
+    for name in sorted(given.keys() - {*OWN, *SHARED}):
+        if given[name] != made.get_default(name):
+            raise CommandError(f"--{name.replace('_', '-')} does not apply to --board {BOARD}")
+
+
+def profile_of(options: argparse.Namespace, made: Parser) -> tuple[Profile, CodeLocations]:
+    """Run an image on a Kilobot for `emu profile` and return its profile, and the places of its code.
+
+    Raises CommandError for an option of the parser `made` that does not apply, LoadError for an unreadable image.
+    """
+    refuse_other_options(options, made)
+    from emu.avr.image import load_avr_image
+    from emu.avr.machine import HZ
+    from emu.boards.kilobot.single import SingleKilobot
+    from emu.profile.cycle_shares import CodeLocations
+    from emu.profile.kilobot import profile_kilobot
+
+    image = load_avr_image(options.image)
+    robot = SingleKilobot(image, uid=options.uid or 0, command=options.ohc or "run")
+    skip = int(options.skip * HZ)
+    return profile_kilobot(robot, skip + max(1, int(options.seconds * HZ)), skip), CodeLocations(image)
+
+
 def run(options: argparse.Namespace, made: Parser) -> int:
     """Run an image on a Kilobot and return the exit status that `emu run` documents.
 
     Raises CommandError for an option of the parser `made` that does not apply, LoadError for an unreadable image.
     """
-    given = vars(options)
-    for name in sorted(given.keys() - {*OWN, *SHARED}):
-        if given[name] != made.get_default(name):
-            raise CommandError(f"--{name.replace('_', '-')} does not apply to --board {BOARD}")
+    refuse_other_options(options, made)
     from emu.run.kilobot_session import run_kilobot
 
     done = run_kilobot(options.image, seconds=options.seconds, cycles=options.cycles,

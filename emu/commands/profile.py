@@ -5,10 +5,13 @@ from __future__ import annotations
 import argparse
 import json
 import sys
+from collections.abc import Callable
 from fractions import Fraction
 from pathlib import Path
 from typing import Any, Final
 
+from emu.boards import BOARDS
+from emu.commands import kilobot
 from emu.commands.board_options import add_board_options, board_of, set_up
 from emu.commands.image_option import add_chip_option, image_of
 from emu.host.command import CommandError, Parser, count, seconds
@@ -16,7 +19,7 @@ from emu.host.exit_status import DONE, FAULT
 from emu.host.files import atomic_text_file
 from emu.image.model import Image
 from emu.profile import callgrind
-from emu.profile.cycle_shares import Profile, Profiler
+from emu.profile.cycle_shares import CodeLocation, Profile, Profiler
 from emu.profile.timelines import perfetto, speedscope
 from emu.profile.tracks import Tracks
 
@@ -32,6 +35,12 @@ handler. --group sums code by function or source file (shell patterns) under a g
 --speedscope and --perfetto are timelines: threads, interrupt levels, calls. None of them attributes time in interrupts,
 sleep or other threads to a function.
 
+--lines adds source lines, from the image's DWARF. With --board kilobot, an ATmega328P runs an image of avr-gcc:
+
+    emu profile firmware.elf --board kilobot --seconds 5 --lines 20
+
+It has no interrupt levels and no timelines, and --callgrind has no calls.
+
 Exit status: 0 done, 1 firmware fault (the counts are printed), 2 bad input."""
 
 
@@ -46,11 +55,13 @@ def parser() -> Parser:
     made.add_argument("--seconds", metavar="S", type=seconds, default=Fraction(1), help="simulated time (default 1)")
     made.add_argument("--group", metavar="NAME=PATTERN,...", action="append", default=[], type=_group, help="see above")
     made.add_argument("--top", metavar="N", type=count, default=20, help="functions to print (default 20; 0: all)")
+    made.add_argument("--lines", metavar="N", type=count, default=0, help="source lines to print (default none)")
     made.add_argument("--callgrind", metavar="FILE", help="write calls and lines in Callgrind's format")
     made.add_argument("--speedscope", metavar="FILE", help="write a timeline for speedscope")
     made.add_argument("--perfetto", metavar="FILE", help="write a timeline for Perfetto (Trace Event Format)")
     made.add_argument("--json", action="store_true", help="print one JSON object: cycles and percent")
-    add_board_options(made)
+    add_board_options(made, (*BOARDS, kilobot.BOARD))
+    kilobot.add_options(made)
     return made
 
 
@@ -63,6 +74,13 @@ def _group(text: str) -> tuple[str, list[str]]:
 
 def run(options: argparse.Namespace) -> int:
     """Run the command. Return the exit status as listed in DESCRIPTION."""
+    if options.board == kilobot.BOARD:
+        profile, locations = kilobot.profile_of(options, parser())
+        _check_groups(profile, options.group)
+        if options.callgrind:
+            _write_callgrind(profile, options, locations.at)
+        return _finish(profile, options)
+    kilobot.refuse_options(options)
     from emu.api import Machine
 
     image = image_of(options)
@@ -74,6 +92,11 @@ def run(options: argparse.Namespace) -> int:
     profile = profiler.run(skip + machine.cycles_in(options.seconds), skip)
     _check_groups(profile, options.group)
     _write(profile, profiler, image, options)
+    return _finish(profile, options)
+
+
+def _finish(profile: Profile, options: argparse.Namespace) -> int:
+    """Print the profile and the fault that ended the run, if any. Return the exit status."""
     fault = profile.stop.fault if profile.stop is not None else None
     if options.json:
         facts = _facts(profile, options.group) | ({"fault": fault.facts()} if fault is not None else {})
@@ -89,8 +112,7 @@ def run(options: argparse.Namespace) -> int:
 def _write(profile: Profile, profiler: Profiler, image: Image, options: argparse.Namespace) -> None:
     """Write the files that the options request."""
     if options.callgrind:
-        with atomic_text_file(options.callgrind) as stream:
-            stream.writelines(f"{line}\n" for line in callgrind.lines(profile, str(image.path), profiler.location))
+        _write_callgrind(profile, options, profiler.location)
     if not (options.speedscope or options.perfetto):
         return
     tracks = Tracks(profile.events, lambda pc: profiler.location(pc)[0], profile.start, profile.end, profile.entry)
@@ -101,6 +123,11 @@ def _write(profile: Profile, profiler: Profiler, image: Image, options: argparse
     if options.perfetto:
         with atomic_text_file(options.perfetto) as stream:
             stream.writelines(perfetto(tracks, profiler.location, name, float(profiler.hz), profiler.inside))
+
+
+def _write_callgrind(profile: Profile, options: argparse.Namespace, location_of: Callable[[int], CodeLocation]) -> None:
+    with atomic_text_file(options.callgrind) as stream:
+        stream.writelines(f"{line}\n" for line in callgrind.lines(profile, str(options.image), location_of))
 
 
 def _check_groups(profile: Profile, groups: list[tuple[str, list[str]]]) -> None:
@@ -127,6 +154,7 @@ def _facts(profile: Profile, groups: list[tuple[str, list[str]]]) -> dict[str, A
         "levels": {str(level): share(cycles) for level, cycles in sorted(profile.levels.items())},
         "files": {name: share(cycles) for name, cycles in profile.files.most_common()},
         "functions": {name: share(cycles) for name, cycles in profile.functions.most_common()},
+        "lines": {name: share(cycles) for name, cycles in profile.lines.most_common()},
     }
 
 
@@ -142,6 +170,11 @@ def _print(profile: Profile, options: argparse.Namespace) -> None:
     print()
     for level, cycles in sorted(profile.levels.items()):
         line(f"level {level}", cycles)
-    print()
+    if profile.levels:
+        print()
     for name, cycles in profile.functions.most_common(options.top or None):
+        line(name, cycles)
+    if options.lines:
+        print()
+    for name, cycles in profile.lines.most_common(options.lines):
         line(name, cycles)

@@ -12,7 +12,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from fnmatch import fnmatch
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, Protocol
 
 import numpy as np
 
@@ -23,6 +23,8 @@ from emu.image.model import Image
 from emu.profile.call_graph import NOWHERE, CallEdge, CallEvent, CallGraph
 
 if TYPE_CHECKING:
+    from emu.image.lines import LineTable
+    from emu.image.symbols import Symbols
     from emu.machine.machine import Machine
     from emu.machine.stops import Stop
 
@@ -30,6 +32,15 @@ IDLE_FUNCTION: Final = "hal_idle"
 """Function in which the scheduler of OpenSwarm waits (firmware/openswarm/port/dspic30f/switch.S)."""
 CodeLocation = tuple[str, str, int]
 """(function, source file, line) of code; "" and 0 for code without line information."""
+
+
+class CodeImage(Protocol):
+    """An image with symbols and source lines by program address."""
+
+    @property
+    def symbols(self) -> Symbols: ...
+    @property
+    def lines(self) -> LineTable: ...
 
 
 @dataclass(slots=True)
@@ -80,6 +91,15 @@ class Profile:
         return self._summed(0)
 
     @property
+    def lines(self) -> Counter[str]:
+        """Cycles by source line, as text `file:line`; code without line information is omitted."""
+        sums: Counter[str] = Counter()
+        for (_, file, line), cycles in self.locations.items():
+            if file:
+                sums[f"{file}:{line}"] += cycles
+        return sums
+
+    @property
     def files(self) -> Counter[str]:
         """Cycles by source file; "" stands for code without line information."""
         return self._summed(1)
@@ -113,6 +133,34 @@ def _matches(place: CodeLocation, patterns: list[str]) -> bool:
     return any(fnmatch(name, pattern) for name in place[:2] for pattern in patterns)
 
 
+class CodeLocations:
+    """Functions and source lines of an image's instructions."""
+
+    def __init__(self, image: CodeImage) -> None:
+        self._image: Final = image
+        self._rows: Final[dict[int, int]] = {}
+        self._locations: Final[dict[int, CodeLocation]] = {}
+
+    def row_of(self, pc: int) -> int:
+        """Return the first address of the code range that contains `pc` and has one function and line."""
+        row = self._rows.get(pc)
+        if row is None:
+            line, symbol = self._image.lines.find(pc), self._image.symbols.code(pc)
+            starts = [line.start] if line is not None else []
+            if symbol is not None:
+                starts.append(symbol[0].address)
+            row = self._rows[pc] = max(starts, default=pc)
+        return row
+
+    def at(self, pc: int) -> CodeLocation:
+        """Return function, file and line of an instruction."""
+        known = self._locations.get(pc)
+        if known is None:
+            line, name = self._image.lines.find(pc), self._image.symbols.text(pc).split("+")[0]
+            known = self._locations[pc] = (name, line.file, line.line) if line is not None else (name, "", 0)
+        return known
+
+
 class Profiler:
     """Profiler of `machine`, whose engine must be jit or plain. `timed` also keeps the call events.
 
@@ -132,9 +180,8 @@ class Profiler:
             machine.cycle, machine.pc, timed, idle.address if idle is not None else NOWHERE
         )
         self._accounting: Final = CycleAccounting(machine.core, self._call_graph.process)
-        self._rows: Final[dict[int, int]] = {}
+        self._code: Final = CodeLocations(image)
         self._inside: Final[dict[int, frozenset[str]]] = {}
-        self._locations: Final[dict[int, CodeLocation]] = {}
         self.hz: Final = machine.hz
         """Cycles per second."""
 
@@ -174,7 +221,7 @@ class Profiler:
         if self._native is not None:
             from emu.dspic30f.jit.counting import CycleCounting
 
-            return self._native.start_counting(CycleCounting(self._accounting, self.row_of))
+            return self._native.start_counting(CycleCounting(self._accounting, self._code.row_of))
         self._accounting.start()
         return self._accounting.stop
 
@@ -192,24 +239,13 @@ class Profiler:
         rows: Counter[int] = Counter()
         spent = cells.sum(axis=0)
         for word in np.flatnonzero(spent).tolist():
-            rows[self.row_of(2 * word)] += int(spent[word])
+            rows[self._code.row_of(2 * word)] += int(spent[word])
         profile.addresses = dict(rows)
         for row, cycles in rows.items():
             profile.locations[self.location(row)] += cycles
         profile.edges = self._call_graph.end(profile.end)
         if self._timed:
             profile.events = self._call_graph.events()
-
-    def row_of(self, pc: int) -> int:
-        """Return the first address of the code range that contains `pc` and has one function and line."""
-        row = self._rows.get(pc)
-        if row is None:
-            line, symbol = self._image.lines.find(pc), self._image.symbols.code(pc)
-            starts = [line.start] if line is not None else []
-            if symbol is not None:
-                starts.append(symbol[0].address)
-            row = self._rows[pc] = max(starts, default=pc)
-        return row
 
     def inside(self, pc: int) -> frozenset[str]:
         """Return the functions that contain an instruction, including inlined ones, from the debug information."""
@@ -220,10 +256,10 @@ class Profiler:
             known = self._inside[pc] = frozenset(scope.name for scope in scopes if scope.kind != "block")
         return known
 
+    def row_of(self, pc: int) -> int:
+        """Return the first address of the code range that contains `pc` and has one function and line."""
+        return self._code.row_of(pc)
+
     def location(self, pc: int) -> CodeLocation:
         """Return function, file and line of an instruction."""
-        known = self._locations.get(pc)
-        if known is None:
-            line, name = self._image.lines.find(pc), self._image.symbols.text(pc).split("+")[0]
-            known = self._locations[pc] = (name, line.file, line.line) if line is not None else (name, "", 0)
-        return known
+        return self._code.at(pc)

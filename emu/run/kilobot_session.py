@@ -9,15 +9,10 @@ from typing import Any, Final
 
 from emu.avr.image import AvrImage, load_avr_image
 from emu.avr.machine import HZ, Atmega328p, AvrFault
-from emu.boards.kilobot.messages import DATA_SIZE, TYPES, Message, frame
 from emu.boards.kilobot.observer import WATCHED, KilobotObserver, Report
-from emu.boards.kilobot.overhead import send_frame
-from emu.boards.kilobot.swarm import KilobotFaultError, KilobotSetup, KilobotSwarm
+from emu.boards.kilobot.single import SingleKilobot
+from emu.boards.kilobot.swarm import KilobotFaultError
 
-FIRST_COMMAND: Final = HZ // 5
-"""Tick of the overhead controller's first message."""
-COMMAND_TICKS: Final = HZ // 2
-"""Ticks for which it repeats the message. IDLE looks at the robot's state every 201 ms (kilobot.md §2)."""
 CHUNK: Final = HZ // 10
 """Ticks after which outputs are reported."""
 
@@ -68,22 +63,18 @@ def run_kilobot(
     """
     limit = cycles if seconds is None else max(1, int(seconds * HZ))
     image = load_avr_image(path)
-    swarm = KilobotSwarm([KilobotSetup(image, number=uid)])
-    machine, observer = swarm.robots[0], KilobotObserver()
+    robot, observer = SingleKilobot(image, uid=uid, command=command), KilobotObserver()
+    swarm, machine = robot.swarm, robot.machine
     machine.watch(WATCHED)
     run = KilobotRun(image, "limit", 0, 0, 0.0)
     start = time.perf_counter()
-    next_command = FIRST_COMMAND if command != "none" else None
     try:
         while limit is None or swarm.now < limit:
-            ends = [end for end in (swarm.now + CHUNK, limit, next_command) if end is not None]
-            swarm.run_until(min(ends))
+            robot.run_until(swarm.now + CHUNK if limit is None else min(swarm.now + CHUNK, limit))
             _report(run, observer.reports_of(machine.changes), show)
             machine.changes.clear()
             _report(run, observer.settled_states(machine.cycle), show)
-            if swarm.now == next_command:
-                next_command = _send(swarm, command)
-            if machine.state.halted and next_command is None:
+            if machine.state.halted and robot.next_command is None:
                 run.reason = "halt"
                 break
     except KilobotFaultError:
@@ -112,12 +103,6 @@ def _notes(machine: Atmega328p) -> list[str]:
     if caller is not None:
         notes.append(f"the stack's uppermost return address belongs to the call at {machine.image.place(caller)}")
     return notes
-
-
-def _send(swarm: KilobotSwarm, command: str) -> int | None:
-    """Send one message of the overhead controller now. Return the tick of the next one, None after the last."""
-    after = send_frame(swarm, frame(Message(bytes(DATA_SIZE), TYPES[command])))
-    return after if after < FIRST_COMMAND + COMMAND_TICKS else None
 
 
 def _report(run: KilobotRun, reports: Iterable[Report], show: bool) -> None:

@@ -54,6 +54,7 @@ static void enter_interrupt(struct avr *m, u32 pending)
     m->pc = (u16)(base + 2 * vector);
     m->tracing = 0, m->round = 0, m->counts_until = 0;
     m->cycle += INTERRUPT_CYCLES;
+    m->interrupts++;
     acknowledge(m, vector);
 }
 

@@ -67,6 +67,7 @@ FIELDS: Final[tuple[tuple[str, str, int], ...]] = (
     ("boot_start", _U16, 1),  # word address of the boot section (fuses)
     ("starts_in_boot", _U8, 1),  # 1: reset starts in the boot section (fuse)
     ("resets", _U32, 1),
+    ("interrupts", _U32, 1),  # entries of interrupts since power-on
     # inputs from the board, in order of time
     ("input_first", _U16, 1),
     ("input_count", _U16, 1),

@@ -6,6 +6,7 @@
 // effect.
 
 typedef i64 (*run_function)(struct avr *m, const struct insn *code, u64 until);
+typedef i64 (*observed_function)(struct avr *m, const struct insn *code, u64 until, void *observation);
 typedef i64 (*input_function)(struct avr *m, u64 at, i64 kind, i64 value);
 
 // MARGIN: ticks by which the last instruction may pass the goal of a robot; all light until then must be known.
@@ -38,6 +39,7 @@ struct robot {
     u32 lights, edge_count;
     u64 reached; // tick up to which the robot has run
     u64 pulses;  // light pulses it has sent
+    void *observation; // of a profile or debugger, else 0
     struct edge *edges; // `room` of them
 };
 
@@ -48,6 +50,7 @@ struct air {
     u64 *acts;          // earliest tick at which each robot can send light
     run_function run;
     input_function input;
+    observed_function run_observed;
     u64 delay, seed, room;
     u64 lost_edges; // edges for which a receiver had no room
 };
@@ -188,7 +191,7 @@ void air_flash(struct air *a, i64 receiver, i64 at, i64 ticks, i64 high_uv, i64 
 }
 
 // Run one robot to tick `goal`; if it sends light, only until an answer to that light can arrive. Return 0, or 1 if
-// Python must handle its state (fault, log, new program).
+// Python must handle its state (fault, log, new program, end of an observed run).
 static int run_robot(struct air *a, i64 index, u64 goal)
 {
     struct robot *r = a->robots + index;
@@ -196,7 +199,8 @@ static int run_robot(struct air *a, i64 index, u64 goal)
         deliver(a, r, r->reached + MARGIN);
         u64 piece = r->edge_count && r->edges[0].at - MARGIN < goal ? r->edges[0].at - MARGIN : goal;
         u64 cycle = cycle_at(r, piece);
-        i64 result = a->run(r->avr, r->code, cycle);
+        i64 result = r->observation ? a->run_observed(r->avr, r->code, cycle, r->observation)
+                                    : a->run(r->avr, r->code, cycle);
         if (result == RUN_HALT) // only light can wake it
             r->avr->cycle = cycle > r->avr->cycle ? cycle : r->avr->cycle;
         u64 reached = tick_of(r, r->avr->cycle);

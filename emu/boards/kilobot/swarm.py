@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Callable, Sequence
-from ctypes import Structure, addressof, c_int32, c_int64, c_uint32, c_uint64, c_void_p, sizeof
+from ctypes import Structure, addressof, c_int32, c_int64, c_uint32, c_uint64, c_void_p, memmove, sizeof, string_at
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -20,10 +20,11 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from emu.avr.core.state import declaration
+from emu.avr.core.state import Avr, declaration
 from emu.avr.image import AvrImage
 from emu.avr.machine import HZ, Atmega328p, Program
 from emu.avr.native import TYPES, native
+from emu.avr.observation import STOP_NONE, Observation
 from emu.native_library import ADDRESS, INT, address_of, functions_of
 
 REACH_MM: Final = 70.0
@@ -82,17 +83,20 @@ class _Robot(Structure):
     _fields_ = [("avr", c_void_p), ("code", c_void_p),
                 *((name, c_uint64) for name in ("on_at", "rate", "period")),
                 ("lights", c_uint32), ("edge_count", c_uint32), ("reached", c_uint64), ("pulses", c_uint64),
-                ("edges", c_void_p)]  # fmt: skip
+                ("observation", c_void_p), ("edges", c_void_p)]  # fmt: skip
     code: int
     on_at: int
     period: int
     pulses: int
+    reached: int
+    observation: int | None
 
 
 class _Air(Structure):
     """Mirror of `struct air` in air.c."""
 
-    _fields_ = [("count", c_int64), *((name, c_void_p) for name in ("robots", "links", "acts", "run", "input")),
+    _fields_ = [("count", c_int64),
+                *((name, c_void_p) for name in ("robots", "links", "acts", "run", "input", "run_observed")),
                 *((name, c_uint64) for name in ("delay", "seed", "room", "lost_edges"))]  # fmt: skip
     lost_edges: int
 
@@ -153,6 +157,7 @@ class KilobotSwarm:
         """Positions of the centres in mm; `move` and `move_all` change them."""
         self.now = 0
         """Ticks of 1/8 MHz since the start."""
+        self._observed: tuple[int, Observation | None] = (0, None)
         self._functions = _code()
         programs: dict[bytes, Program] = {}
         self.robots: list[Atmega328p] = []
@@ -176,7 +181,8 @@ class KilobotSwarm:
         functions = native()
         self._air = _Air(
             count, addressof(self._robots), addressof(self._links), addressof(self._acts),
-            address_of(functions["avr_run"]), address_of(functions["avr_input"]), delay,
+            address_of(functions["avr_run"]), address_of(functions["avr_input"]),
+            address_of(functions["avr_run_observed"]), delay,
             seed * 2_654_435_761 % (1 << 63) | 1, room,
         )  # fmt: skip
         self._update_links(np.arange(count))
@@ -228,12 +234,25 @@ class KilobotSwarm:
         """Return the light pulses that a robot has sent since power-on."""
         return self._robots[robot].pulses
 
+    def observe(self, robot: int, observation: Observation | None) -> None:
+        """Run a robot instruction by instruction from now on; None: as the others. The result of a run is the same."""
+        self._observed = (robot, observation)
+        self._robots[robot].observation = None if observation is None else addressof(observation)
+
+    @property
+    def is_stopped(self) -> bool:
+        """Whether the observed robot has ended the run: `reason` of its observation says why."""
+        return self._observed[1] is not None and self._observed[1].reason != STOP_NONE
+
     def run(self, seconds: float) -> None:
         """Run all robots for a time. Raises KilobotFaultError."""
         self.run_until(self.now + int(seconds * HZ))
 
     def run_until(self, tick: int) -> None:
-        """Run all robots to a tick of 1/8 MHz. Raises KilobotFaultError; ValueError after too many calls of `light`."""
+        """Run all robots to a tick of 1/8 MHz, or until the observed one stops; `now` is then its tick.
+
+        Raises KilobotFaultError; ValueError after too many calls of `light`.
+        """
         self.now = tick
         while True:
             index = self._functions["air_run"](addressof(self._air), tick)
@@ -245,10 +264,40 @@ class KilobotSwarm:
             if fault is not None:
                 place = machine.image.place(fault.pc)
                 raise KilobotFaultError(index, f"{fault.message} at {place}, cycle {fault.cycle}")
+            if self.is_stopped:
+                break
+        if self.is_stopped:
+            self.now = min(self._robots[self._observed[0]].reached, tick)
         for machine in self.robots:
             machine.attend()
         if self._air.lost_edges:
             raise ValueError("more pulses of light wait for a robot than there is room for")
+
+    @property
+    def _parts(self) -> list[tuple[int, int]]:
+        """Addresses and sizes of everything that changes by a run, beside the robots and `now`."""
+        parts = (self._robots, self._edges, self._links, self._acts, self._air)
+        return [(addressof(part), sizeof(part)) for part in parts]
+
+    def snapshot(self) -> bytes:
+        """Return the state of all robots and of the light between them. It does not contain their positions."""
+        light = [string_at(address, size) for address, size in self._parts]
+        return b"".join([struct.pack("<Q", self.now), *light, *(one.snapshot() for one in self.robots)])
+
+    def restore(self, snapshot: bytes) -> None:
+        """Return to the state of a snapshot of this swarm; observations stay. Raises ValueError for other bytes."""
+        if len(snapshot) != 8 + sum(size for _, size in self._parts) + sizeof(Avr) * len(self.robots):
+            raise ValueError("these bytes are no snapshot of this swarm")
+        (self.now,) = struct.unpack_from("<Q", snapshot)
+        at = 8
+        for address, size in self._parts:
+            memmove(address, snapshot[at : at + size], size)
+            at += size
+        for index, machine in enumerate(self.robots):
+            machine.restore(snapshot[at : at + sizeof(Avr)])
+            at += sizeof(Avr)
+            self._robots[index].code = machine.program.address
+        self.observe(*self._observed)
 
     def close(self) -> None:
         """Do nothing: a swarm holds only memory. The method is for the `with` statement."""
