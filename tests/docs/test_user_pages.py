@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import shlex
 import shutil
+import subprocess
 from pathlib import Path
 
 import pytest
@@ -74,3 +75,34 @@ def test_the_notebook_page_runs(
     assert "main" in set(names["memory"].frame()["name"])  # type: ignore[attr-defined]
     assert (tmp_path / "build/path.png").stat().st_size > 5000
     assert (tmp_path / "build/shares.png").stat().st_size > 5000
+
+
+@pytest.mark.slow
+def test_the_page_of_an_own_experiment_runs(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """All blocks of docs/own-experiment.md run in order in an empty folder; the files have the names that it says."""
+    pytest.importorskip("pandas", reason="pandas is not installed (extra: test)")
+    import matplotlib as mpl
+
+    mpl.use("Agg")
+    monkeypatch.chdir(tmp_path)
+    page = (DOCS / "own-experiment.md").read_text(encoding="utf-8")
+    blocks = re.findall(r"```(\w+)\n(.*?)```", page, re.DOTALL)
+    assert [kind for kind, _ in blocks] == ["toml", "python", "python", "sh", "sh", "python", "sh"]
+    for name, (_, text) in zip(("scatter.toml", "scatter.py", "near.py"), blocks[:3], strict=True):
+        Path(name).write_text(text)
+    for kind, text in blocks[3:]:
+        if kind == "python":
+            exec(compile(text, "docs/own-experiment.md", "exec"), {})
+            continue
+        for command in text.splitlines():
+            if command.startswith("sed "):
+                subprocess.run(["sh", "-c", command], check=True)
+            else:
+                assert main(shlex.split(command)[1:]) == 0, command
+    assert Path("gap.png").stat().st_size > 5000
+    said = capsys.readouterr().out
+    assert "mean distance to the nearest robot at 30 s" in said
+    assert "p cannot fall below 0.25" in " ".join(said.split())
+    assert Path("far.py").read_text() != Path("near.py").read_text()
