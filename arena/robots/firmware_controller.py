@@ -212,7 +212,7 @@ class FirmwareController:
 
     @property
     def has_stopped(self) -> bool:
-        """Whether the firmware has stopped for good."""
+        """Whether the firmware has stopped after a fault."""
         return bool(self._fault)
 
     def speed(self, tick: int) -> tuple[float, float]:

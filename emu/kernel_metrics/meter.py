@@ -71,13 +71,13 @@ class Meter:
         return str(line) if line else self.target.image.symbols.text(pc).split("+")[0]
 
     def inside(self, name: str) -> Callable[[], bool]:
-        """Return a function that tells whether the next instruction belongs to the function `name`."""
+        """Return a predicate: whether the next instruction belongs to the function `name`."""
         first = self.target.address(name)
         last = first + (self.target.size(name) or 2)
         return lambda: first <= self.machine.pc < last
 
     def returned(self) -> Callable[[], bool]:
-        """Return a function that tells whether the function about to be entered has returned."""
+        """Return a predicate: whether the function that is about to be entered has returned."""
         machine = self.machine
         stack = machine.w[STACK_POINTER] - CALL_BYTES
         back = (machine.peek(stack + 2) & 0x7F) << 16 | machine.peek(stack)

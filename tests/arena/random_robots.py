@@ -226,7 +226,7 @@ def _asks(chance: Chance, _n: int) -> str:
 
 
 def _ends(chance: Chance, _n: int) -> str:
-    """Reset the chip or stop for good after some rounds."""
+    """Reset the chip or stop permanently after some rounds."""
     what = chance.choice(
         (
             "reset",

@@ -79,7 +79,7 @@ def pulses_of(octets: bytes, start: int = 0) -> Iterator[int]:
 
 
 class PulseDecoder:
-    """Decoder of the pulses of one robot. `damaged` counts frames that were given up."""
+    """Decoder of the pulses of one robot. `damaged` counts incomplete frames."""
 
     def __init__(self) -> None:
         self.damaged = 0

@@ -1,4 +1,4 @@
-"""Exit reasons: numbers with which native code tells its caller why it returned."""
+"""Exit reasons: numbers by which native code states why it returned to its caller."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 """Motor control PWM (DS70135G §15): time base, duty cycles, dead time, override, fault input, special event trigger.
 
-One event handles whatever is due next: the end of a period, an edge of a comparison, the end of a dead time, or the
+One event is posted for the next change: the end of a period, an edge of a comparison, the end of a dead time, or the
 special event. Outputs are driven at these events; nothing is polled.
 
 UNVERIFIED: outputs of a stopped time base (PTEN = 0) are inactive; a dead time follows changes of a comparison, not

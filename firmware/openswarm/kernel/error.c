@@ -51,7 +51,7 @@ sys_error os_refuse(void)
     return SYS_ERROR_CONTEXT;
 }
 
-/* Whether an entry counts the losses of event id. The first event that reaches a free entry claims it for good. */
+/* Whether an entry counts the losses of event id. The first event that reaches a free entry claims it permanently. */
 static bool belongs_to(loss *entry, uint16 id)
 {
     hal_lock_state lock = hal_lock_devices();

@@ -71,7 +71,7 @@ def test_neighbours_may_say_anything(tmp_path):
     """150 random histories under sanitizers leave programs whole and robots silent when no message arrives.
 
     They contain false advertisements, two programs of one version, requests for missing rows, power failures, worn
-    flash and a wrapping clock. An advertised program that no robot sends is given up.
+    flash and a wrapping clock. Robots stop requesting an advertised program that no robot sends.
     """
     said = on_host("hostile", tmp_path)
     assert int(re.search(r"(\d+) messages", said)[1]) > 100_000

@@ -122,7 +122,7 @@ POLL = """
 
 
 def test_a_poll_that_hits_the_cycle_of_its_event_stays_native() -> None:
-    """A poll of SPIRBF in the very cycle in which a word of 64 Tcy ends stays native."""
+    """A poll of SPIRBF in the cycle in which a word of 64 Tcy ends stays native."""
     rig = machine("jit", POLL)
     rig.machine.run(cycles=100_000)
     before = rig.machine.runner.counts.interpreted
