@@ -34,7 +34,7 @@ RARE = ("refuse_message", "save_dsp")
 LEADS = (2, 4, 6)
 """Cycles from a request to the deepest moment; an interrupt is accepted some cycles after its request."""
 ACCEPTANCE, FRAME, HANDLER = 8, 80, 2_000
-"""Maximum instructions before a requested interrupt, of one that switches threads, and of any other."""
+"""Maximum number of instructions from a request to its handler, of the slice interrupt, and of any other handler."""
 PRIORITY = 5
 """Position of the CPU priority in SR."""
 

@@ -1,9 +1,8 @@
 """An e-puck2's Cortex-M4 or a RISC-V in QEMU, driven through the gdb stub; `now` counts instructions that were stepped.
 
-The e-puck2's machine is netduinoplus2 (STM32F405), the nearest that Debian's QEMU has: the same core and UART. The
-clock is fixed by `-icount`: an instruction takes a constant time, and the same run comes out the same. A run for its
-text has `sleep=off`, so that sleeping takes no time of the host; under the gdb stub that would let the clock run on
-while the CPU is looked at.
+The e-puck2 runs on QEMU's machine netduinoplus2 (STM32F405), which has the same core and UART. `-icount` gives each
+instruction a constant time, so that runs repeat exactly. A run that only collects text uses `sleep=off`: the sleep of
+the CPU then takes no host time. The gdb stub cannot use it, because the clock would run while the CPU is stopped.
 """
 
 from __future__ import annotations

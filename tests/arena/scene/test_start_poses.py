@@ -127,7 +127,7 @@ def test_bodies_that_overlap_are_refused(robot: tuple[int, int], thing: tuple[in
 def test_polygons_that_overlap_are_refused(
     robot: tuple[float, float], boxes: tuple[tuple[float, ...], ...], words: str
 ) -> None:
-    """A robot may touch a side of a box; it may not stand in it, nor a box in another one or in a wall."""
+    """A robot may touch a side of a box but not overlap it. Two boxes, or a box and a wall, may not overlap either."""
     box = ObjectKind(count=2, polygon=((0, 0), (20, 0), (20, 20), (0, 20)), radius_cm=14.2)
     scene = load_scene("clustering").with_values(robots__count=1, objects__count=2)
     scene = replace(scene, kinds=(box,)).with_values(start__robot_poses=[[*robot, 0]], start__object_poses=boxes)

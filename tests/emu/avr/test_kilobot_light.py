@@ -41,7 +41,7 @@ int main(void)
 
 
 def blinking(ending: str) -> str:
-    """Return a program that keeps its emitter on for 1 ms in turn, or does something else while it is on."""
+    """Return a program that switches its emitter on, executes the statements `ending`, and switches it off for 1 ms."""
     return f"int main(void) {{ DDRB = 1; for (;;) {{ PORTB = 1; {ending} PORTB = 0; {WAIT}(8000); }} }}"
 
 

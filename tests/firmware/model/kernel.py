@@ -17,7 +17,7 @@ class Kernel(Remote):
     def __init__(self, sizes: Sizes, code: Code) -> None:
         super().__init__(sizes, code)
         self.speeds = [0, 0]
-        """Of the left and the right wheel in mm/s."""
+        """Speeds of the left and the right wheel in mm/s."""
         for number in (TERMINATION, CLOCK, LEFT, RIGHT):
             self.register(number)
         for number in (LEFT, RIGHT):

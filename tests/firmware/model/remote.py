@@ -40,7 +40,7 @@ class Remote(Waits):
         super().__init__(sizes, code)
         self.slots_of_shared = [Slot() for _ in range(sizes.remote_events)]
         self.share_gates: dict[int, Event] = {}
-        """The event for which the gate of a number was created; a gate takes memory."""
+        """By event number: the event for which a gate was created, which takes memory."""
         self.heard: dict[int, Heard] = {}
         self.arriving = False
         self.frames = 0

@@ -55,7 +55,10 @@ def test_a_word_that_assembly_leaves_on_the_stack_does_no_harm(options: tuple[st
 
 @pytest.mark.parametrize("level", ["0", "1", "s", "2"])
 def test_every_function_is_framed(level: str) -> None:
-    """Also leaf functions and handlers; functions whose assembly changes W14 keep it for themselves."""
+    """With -fno-omit-frame-pointer, leaf functions and handlers have frames, too.
+
+    Functions whose inline assembly changes W14 have none.
+    """
     source = (
         "#include <xc.h>\nint leaf(int x) { return x + 1; }\n"
         "void _ISR _T1Interrupt(void) {}\n"
