@@ -26,8 +26,8 @@ COLOURS: Final = np.array(
 classifier: red (80,0,0), green (0,40,0), white (100,80,80) (openswarm-original.md §8). UNVERIFIED on a robot."""
 
 LED_COLOURS: Final = ((220, 24, 20), (16, 110, 24))
-"""Colours of a lit red LED and of a body lit by its green LED: red and green for the firmware's classifier. Like all
-colours they change with the brightness of the room. UNVERIFIED"""
+"""Colours of a lit red LED and of a body lit by its green LED: red and green for the firmware's classifier. UNVERIFIED:
+like all colours, they change with the brightness of the room."""
 LED_POSITIONS: Final = (
     *((math.cos(math.tau / 8 * led), -math.sin(math.tau / 8 * led), *dimensions.RING_HEIGHTS) for led in range(8)),
     (1.0, 0.0, *dimensions.FRONT_HEIGHTS),

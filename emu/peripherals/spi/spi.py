@@ -242,14 +242,14 @@ class Spi(Peripheral):
         self._take_pins()
 
     def stops_in(self, mode: int) -> bool:
-        """Whether the clock stops. A slave has an external clock and continues.
+        """Whether the clock stops.
 
-        UNVERIFIED: §12 does not cover Sleep.
+        UNVERIFIED: a slave, which has an external clock, continues in Sleep; §12 does not cover this.
         """
         return bool(self.con["MSTEN"]) and super().stops_in(mode)
 
     def freeze(self, cycle: int, mode: int) -> None:
-        """Abort the current word; keep the word in TXB. UNVERIFIED: §12 does not cover Sleep."""
+        """Stop the clock. UNVERIFIED: the current word is lost, the word in TXB remains; §12 does not cover Sleep."""
         self._busy.value = 0
         self._start.value = NEVER
         self.events.cancel(self._step)

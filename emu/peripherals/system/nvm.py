@@ -19,8 +19,9 @@ _KEY: Final = (0x55, 0xAA)
 _WINDOW: Final = 3
 """Maximum Tcy between two steps of the key sequence.
 
-UNVERIFIED: the manual requires consecutive instructions, with at most a literal load between the two keys. An interrupt
-between them takes longer than this limit, so it breaks the sequence as on silicon (§16).
+UNVERIFIED: other instructions may be between the steps within this limit. The manual requires consecutive instructions,
+with at most a literal load between the two keys. An interrupt takes longer than the limit, so it breaks the sequence as
+on silicon (§16).
 """
 
 ERASE_FLASH_ROW, PROGRAM_FLASH_ROW = 0x41, 0x01

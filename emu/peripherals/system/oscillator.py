@@ -196,7 +196,7 @@ class Oscillator(Peripheral):
         self.con["OSWEN"] = 0
 
     def reselect(self) -> None:
-        """Select the configured source after a brown-out, as after power-on. UNVERIFIED: §4 does not say."""
+        """Handle a brown-out. UNVERIFIED: it selects the configured source, as power-on does; §4 does not say so."""
         self.con["NOSC"] = self._config("FOS")
         self._run_from(self.con["NOSC"], self.now)
 

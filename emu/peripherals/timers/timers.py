@@ -248,7 +248,7 @@ class Timer(Counter):
     def _control_changed(self, old_con: int) -> None:
         """Handle a change of TxCON. The prescaler is cleared when TON falls or the clock source changes (§7 rule 6).
 
-        UNVERIFIED: by the data sheet any write to TxCON clears it; here only writes that change the clock do.
+        UNVERIFIED: other writes to TxCON keep the prescaler; by the data sheet, any write clears it.
         """
         present = self.con.value
         lsb, width = self.context.chip.sfrs[self.con.name].fields["TCKPS"]

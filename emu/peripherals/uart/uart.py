@@ -412,7 +412,8 @@ class Uart(Peripheral):
             else:
                 self._abort()
         if "ALTIO" in self.context.chip.sfrs[self.mode.name].fields and self.mode["ALTIO"]:
-            self.bus.report_unmodelled(f"{self.mode.name}.ALTIO: the UART keeps its standard pins")  # UNVERIFIED (§10)
+            # UNVERIFIED: the package does not connect the alternate pins (§10).
+            self.bus.report_unmodelled(f"{self.mode.name}.ALTIO: the UART keeps its standard pins")
         self.restored()
         self._plan_line()
 
@@ -509,7 +510,7 @@ class Uart(Peripheral):
     def freeze(self, cycle: int, mode: int) -> None:
         """Stop the clock. Idle with USIDL suspends transfers. Sleep aborts them, and TX then idles high.
 
-        UNVERIFIED: §10 does not say what happens to a reception in progress.
+        UNVERIFIED: Sleep also aborts a reception in progress; §10 does not say so.
         """
         if mode == SLEEP and (self._shifting.value or self._tx_count.value):
             self.events.cancel(self._tx_event)

@@ -51,7 +51,7 @@ class Robot:
 class Kilobots:
     """A paused swarm. Raises NotInstalled, Stopped, ValueError.
 
-    `loss` is the part of pulses, 0 to 1, that a receiver misses. Each robot sees its own light, too."""
+    `loss` is the share of pulses, 0 to 1, that a receiver misses. Each robot sees its own light, too."""
 
     def __init__(self, robots: Sequence[Robot], *, seed: int = 1, loss: float = 0.0) -> None:
         if not 0 <= loss < 1:

@@ -1,6 +1,6 @@
 """Campaign: rows of the AVR table with random words and states, and programs in lock step, beside simavr.
 
-One try: 2,000 cases of every row, and a million instructions of one of ten programs.
+A trial has 2,000 cases of every row, and a million instructions of one of ten programs.
 """
 
 from __future__ import annotations

@@ -20,7 +20,7 @@ enum {
     PATIENCE = 3 * SYS_SPREAD_TICK, /* ms without data before a request is repeated, plus up to twice that */
     BEHIND = 2000,                  /* the same after data of a row that this robot has already */
     POLITENESS = 20000, /* ms without a useful part after which a robot no longer postpones its requests */
-    DOUBLINGS = 3,      /* of PATIENCE while no data arrive */
+    DOUBLINGS = 3,      /* number of times that PATIENCE doubles while no data arrive */
     MOST_ASKED = 16,    /* requests in vain; then requests stop and another program may replace this one */
     MOST_SERVED = 180,  /* parts of a row; beyond that a request for the row is answered by one part */
     FORGIVEN = 16000,   /* ms after which one served part of each row is forgotten */

@@ -395,7 +395,7 @@ def subject(seed: int, engine: str, stretches: dict[int, list[int]], chip: Chip 
 
 
 def invalidate(draw: random.Random, subject: Subject) -> None:
-    """Apply a random external input, at once or soon."""
+    """Apply a random external input in the current cycle or a few cycles later."""
     machine = subject.machine
     kind, cycle, board = draw.randrange(14), machine.cycle, machine.board
     if machine.is_asleep:
