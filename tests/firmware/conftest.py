@@ -1,13 +1,17 @@
 """Fixtures that build firmware images, each once per test run, in a temporary folder.
 
-Images share the IR of kernel and drivers in the cache (`toolchain cc -fcache-ir`).
+Images share the IR of kernel and drivers in the cache (`toolchain cc -fcache-ir`). The firmware's Makefile says how to
+build them; its compiler commands run in this process, which saves half of a build's CPU time.
 """
 
 from __future__ import annotations
 
+import contextlib
 import fcntl
 import hashlib
+import io
 import os
+import shlex
 import shutil
 import subprocess
 import sys
@@ -17,6 +21,7 @@ from pathlib import Path
 import pytest
 
 from tests.watchdog import HANG
+from toolchain.driver import driver
 
 ROOT = Path(__file__).resolve().parents[2]
 FIRMWARE = ROOT / "firmware"
@@ -25,12 +30,35 @@ TARGET_APPS = Path(__file__).parent / "target"
 Build = Callable[..., Path]
 
 
-def run_make(folder: Path, *words: str) -> None:
-    """Run `make` once; on failure the test fails with the compiler's messages."""
-    command = ["make", "-s", "-C", str(folder), *words]
+COMPILE = f"PYTHONPATH={ROOT} {sys.executable} -m toolchain cc "
+"""Beginning of the Makefile's command that compiles and links an image for the e-puck."""
+
+
+def run_make(folder: Path, *words: str) -> str:
+    """Run `make` and return its output; on failure the test fails with the compiler's messages."""
+    return run(["make", "-s", "-C", str(folder), *words], folder)
+
+
+def run(command: list[str], folder: Path) -> str:
+    """Run a command in a folder and return its output; on failure the test fails with its messages."""
     environment = {**os.environ, "MAKEFLAGS": ""}
-    done = subprocess.run(command, capture_output=True, text=True, timeout=HANG, check=False, env=environment)
+    done = subprocess.run(
+        command, cwd=folder, capture_output=True, text=True, timeout=HANG, check=False, env=environment
+    )
     assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout
+
+
+def make_in_this_process(folder: Path, *words: str) -> None:
+    """Run the commands of `make -n`, those of the compiler in this process."""
+    for command in run_make(folder, "-n", *words).splitlines():
+        if not command.startswith(COMPILE):
+            run(["sh", "-ec", command], folder)
+            continue
+        said = io.StringIO()
+        with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said), contextlib.chdir(folder):
+            status = driver.main(shlex.split(command.removeprefix(COMPILE)))
+        assert status == 0, said.getvalue()
 
 
 def folder_of_run(factory: pytest.TempPathFactory) -> Path:
@@ -45,7 +73,8 @@ def make_once(factory: pytest.TempPathFactory, name: str, product: str, folder: 
     with out.with_suffix(".lock").open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
         if not (out / product).exists():
-            run_make(folder, f"OUT={out}", *words, str(out / product))
+            make = make_in_this_process if folder == FIRMWARE else run_make
+            make(folder, f"OUT={out}", *words, str(out / product))
     return out / product
 
 
