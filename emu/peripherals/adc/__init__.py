@@ -1,1 +1,1 @@
-"""The 12-bit ADC: registers, conversion schedule, rules for native code."""
+"""ADC of 12 bits, or of 10 bits with four amplifiers: conversions, decoded settings, rules for native code."""

@@ -28,7 +28,7 @@ from emu.peripherals.adc.rules import (
     write_con1,
     write_scan,
 )
-from emu.peripherals.adc.schedule import FOREVER, AnalogInputs, ConversionSettings, PublishedSettings
+from emu.peripherals.adc.settings import FOREVER, AnalogInputs, ConversionSettings, PublishedSettings
 from emu.peripherals.base import SLEEP, ChipContext, Peripheral
 from emu.peripherals.interrupt_lines import Interrupts
 from emu.peripherals.pins import parse_pin

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Final
 
-from emu.peripherals.adc.schedule import FOREVER
+from emu.peripherals.adc.settings import FOREVER
 from emu.system.events import NEVER
 from emu.system.rules import Cell, EventSlot, InterruptLine, Number, RuleBuilder, request
 

@@ -13,8 +13,8 @@ import pytest
 
 import emu
 from emu.chips import NAMES, chip_named
-from emu.peripherals.assembly import Peripherals
 from emu.peripherals.i2c.bus import I2cDevice
+from emu.peripherals.peripherals import Peripherals
 from tests.toolchain.c_programs import build
 from toolchain.peripheral_library import BODIES, headers
 
