@@ -8,7 +8,7 @@
 LINKS_IN_RAM();
 
 sys_pcb os_system;
-sys_pcb *os_running;
+sys_pcb *os_running = &os_system; /* also for a fault before Sys_Init_Kernel */
 sys_pcb *os_ring;
 sys_pcb *os_blocked;
 HAL_ZEROS sys_process_config os_plain;
@@ -144,7 +144,6 @@ bool process_awaits(const event *object)
 
 void process_init(void)
 {
-    os_running = &os_system;
     os_system.status = SYS_READY;
     hal_init(&os_system);
     ring_append(&os_system);

@@ -24,6 +24,7 @@ PIN_MOTORS = 0xFF
 RESET_WATCHDOG, RESET_PIN = 4, 2
 FAULT_ADDRESS, FAULT_STACK, FAULT_ASSERTION = 2, 5, 6
 """Values of sys_reset and sys_fault (openswarm_reset.h)."""
+UARTEN, UTXEN = 1 << 15, 1 << 10
 TABLE = Path(__file__).parents[3] / "docs" / "reference" / "kernel.md"
 
 
@@ -93,6 +94,20 @@ def test_a_fault_is_reported_and_kept_over_a_reset(image: Build, kind: int, faul
     machine.reset("EXTR")
     run_to(machine, "begin")
     assert machine.peek(cause) == RESET_PIN, "a fault is reported once"
+
+
+def test_an_assertion_before_the_kernel_names_main(image: Build) -> None:
+    """Before Sys_Init_Kernel a report names thread 0, here on a UART1 that a boot loader has left enabled."""
+    machine = load(image("failsafe", TARGET_APPS))
+    said = bytearray()
+    machine.uart[1].on_byte = lambda byte, _: said.append(byte)
+    run_to(machine, "main")
+    machine.write("U1MODE", UARTEN)
+    machine.write("U1STA", UTXEN)
+    machine.w[0], machine.w[1] = machine.address_of("depth"), 7  # an empty file name
+    machine.pc = machine.program_address("Sys_Assertion_Failed")
+    assert machine.run(cycles=FCY // 10).reason == "fault"
+    assert said == b":7 in thread 0\r\n"
 
 
 @pytest.mark.parametrize("kind", [3, 4], ids=["section", "handler"])

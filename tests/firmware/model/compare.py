@@ -99,7 +99,8 @@ class Kernels:
 
     def difference(self, program: Program, status: int, records: bytes) -> Difference | None:
         """Return how the kernel's records of a program differ from the model's."""
-        seen, wanted = list(RECORD.iter_unpack(records)), []
+        seen = list(RECORD.iter_unpack(records))
+        wanted: list[Record] = []
         for _, wanted in executions(program, self.sizes, self.base, seen):
             if status == 0 and wanted == seen:
                 return None

@@ -195,6 +195,8 @@ def test_the_smallest_program_of_the_kilobot(tmp_path: Path) -> None:
     behind, last = machine.symbols["_end"] & 0xFFFF, 0x8FF
     paint = b"\xa5"
     machine.poke_bytes(behind + 1, paint * (last - behind))
+    machine.run_to("main")
+    assert pointer(machine, "os_running") == machine.symbols["os_system"] & 0xFFFF, "a fault here names thread 0"
     machine.run(3 * HZ)
     assert machine.uart() == b"hello, swarm\r\n" * 3
     main_stack = len(machine.peek_bytes(behind + 1, last - behind).lstrip(paint))

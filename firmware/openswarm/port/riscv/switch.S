@@ -228,9 +228,6 @@ vectors:
         sw      zero, 0(t0)
         addi    t0, t0, 4
         j       1b
-2:      la      t0, os_system           # reports of faults before Sys_Init_Kernel() read it, too
-        la      t1, os_running
-        sw      t0, 0(t1)
-        call    main
+2:      call    main
         j       hal_stop
         end     cpu_reset
