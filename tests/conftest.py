@@ -38,10 +38,10 @@ def pytest_configure(config: pytest.Config) -> None:
         signal.signal(signal.SIGINT, signal.default_int_handler)
     config.pluginmanager.register(WatchdogPlugin(), "watchdog")
     if not hasattr(config, "workerinput"):
-        # All child processes of a run share compiled modules, even where the environment turns them off.
-        os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
-        compiled = os.environ["PYTHONPYCACHEPREFIX"] = tempfile.mkdtemp(prefix="pycache-")
-        config.add_cleanup(lambda: shutil.rmtree(compiled, ignore_errors=True))
+        # Where the environment turns compiled modules off, the child processes of a run still share them.
+        if os.environ.pop("PYTHONDONTWRITEBYTECODE", None):
+            compiled = os.environ["PYTHONPYCACHEPREFIX"] = tempfile.mkdtemp(prefix="pycache-")
+            config.add_cleanup(lambda: shutil.rmtree(compiled, ignore_errors=True))
         config.pluginmanager.register(Silence(config), "silence")
         config.pluginmanager.register(Skips(config.getoption("--allowed-skips")), "skips")
 

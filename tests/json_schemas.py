@@ -1,4 +1,7 @@
-"""The JSON Schemas of the outputs of --json, for the tests that run the commands."""
+"""The JSON Schemas of the outputs of --json, for the tests that run the commands.
+
+`jsonschema` is imported where it is used: its import takes a second of CPU where the extra `docs` is installed.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +10,6 @@ from pathlib import Path
 from typing import Any, Final
 from urllib.parse import unquote, urlparse
 
-from jsonschema import Draft202012Validator
 from referencing import Registry, Resource
 
 ROOT: Final = Path(__file__).resolve().parents[1]
@@ -29,6 +31,8 @@ def path_of(program: str, output: str) -> Path:
 
 def problems(schema: Path, value: Any) -> list[str]:
     """Return the differences between a value and a schema, each as one line."""
+    from jsonschema import Draft202012Validator
+
     validator = Draft202012Validator({"$ref": schema.as_uri()}, registry=_REGISTRY)
     return [f"{one.json_path}: {one.message}" for one in validator.iter_errors(value)]
 

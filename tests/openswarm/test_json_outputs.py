@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from jsonschema import Draft202012Validator
 
 import arena.cli
 import emu.cli
@@ -91,6 +90,8 @@ def run(images: dict[str, str], tmp_path: Path, capsys: pytest.CaptureFixture[st
 
 def test_schemas_are_valid() -> None:
     """Every file is a schema of draft 2020-12, and every key of an object has a description."""
+    from jsonschema import Draft202012Validator  # slow to import
+
     files = sorted([*ROOT.glob("*/commands/schemas/*.json"), ERROR])
     assert len(files) > 25
     for path in files:

@@ -132,7 +132,7 @@ def test_the_workflow_s_steps_work_offline_as_they_are_written(wheel, baselines,
     environment = {
         "PATH": f"{python.parent}{os.pathsep}/usr/bin{os.pathsep}/bin", "HOME": str(home), "PIP_NO_INDEX": "1",
         "OPENSWARM_PACKAGE": package, "GITHUB_STEP_SUMMARY": str(summary), "OPENSWARM_CACHE": str(paths.cache()),
-        "GITHUB_BASE_REF": "main", "PYTHONPYCACHEPREFIX": os.environ["PYTHONPYCACHEPREFIX"],
+        "GITHUB_BASE_REF": "main", "PYTHONPYCACHEPREFIX": os.environ.get("PYTHONPYCACHEPREFIX", str(home / "compiled")),
     }  # fmt: skip
     git = ("git", "-c", "user.name=x", "-c", "user.email=x@example.org")
     for text in ("init -q -b main", "add .", "commit -q -m x", "remote add origin .", "fetch -q origin"):

@@ -14,7 +14,6 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
-import jsonschema
 import pytest
 from PIL import Image
 
@@ -33,6 +32,8 @@ VSCE = "@vscode/vsce@3"
 
 def validate(configuration: dict[str, Any]) -> None:
     """Validate a launch configuration against the extension's schema. Raises jsonschema.ValidationError."""
+    import jsonschema  # slow to import
+
     assert configuration["type"] == DEBUGGER["type"]
     schema = DEBUGGER["configurationAttributes"][configuration["request"]]
     own = {name: value for name, value in configuration.items() if name not in EVERYWHERE}
@@ -46,11 +47,13 @@ def plain(body: Any) -> Any:
 
 
 def test_snippets_and_first_configurations_fit_the_schema() -> None:
+    from jsonschema import ValidationError  # slow to import
+
     for configuration in DEBUGGER["initialConfigurations"]:
         validate(configuration)
     for snippet in DEBUGGER["configurationSnippets"]:
         validate(plain(snippet["body"]))
-    with pytest.raises(jsonschema.ValidationError, match="selektor"):
+    with pytest.raises(ValidationError, match="selektor"):
         validate({"type": "openswarm", "request": "launch", "selektor": 3})
 
 
