@@ -202,9 +202,9 @@ def include_folders(chip_name: str) -> tuple[Path, Path]:
 
 
 def _write_all(target: Path, chip: Chip) -> None:
-    """Write the peripheral library, the headers with Microchip's names of a chip's header, and last that header.
+    """Write the headers of the peripheral library, headers under Microchip's names, and last the chip's own header.
 
-    XC16 finds its headers in any case: programs use `p30F4011.h`, `p30f4011.h` and `p30f6014A.h`.
+    XC16 accepts header names in upper and lower case: programs use `p30F4011.h`, `p30f4011.h` and `p30f6014A.h`.
     """
     for name, text in peripheral_library.headers(chip).items():
         _write(target.with_suffix("") / name, text)

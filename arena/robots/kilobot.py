@@ -141,7 +141,7 @@ def _setup(scene: Scene, seed: int, robot: int, image: AvrImage) -> KilobotSetup
 
 
 class KilobotController:
-    """One Kilobot of a crowd. Its values of the drive are the mean duties of its left and right motor, 0 to 255."""
+    """One Kilobot of a crowd. It drives with the mean duties of its left and right motor, 0 to 255."""
 
     def __init__(self, scene: Scene, crowd: KilobotCrowd, index: int) -> None:
         self._crowd: Final = crowd

@@ -44,5 +44,5 @@ def logged_writes(machine: Machine, breakpoints: Sequence[Breakpoint]) -> Iterat
 
 
 def site_of(write: Change) -> int:
-    """Return the program address of the instruction that made a write; of an interrupt's entry, its handler."""
+    """Return the program address of the instruction that made a write; for an interrupt entry, that of the handler."""
     return write.pc if write.site == BOUNDARY else write.site
