@@ -93,9 +93,9 @@ def object_patch(kind: ObjectKind, place: tuple[float, ...], colour: str) -> Cir
 
 
 def frame(axis: Axes, trial: Trial) -> None:
-    """Draw the walls, and a scale bar of 100, 50 or 10 cm."""
+    """Draw the walls (dashed: the rectangle of a world without walls), and a scale bar of 100, 50 or 10 cm."""
     width, height = trial.scene.arena.width_cm, trial.scene.arena.height_cm
-    axis.add_patch(Rectangle((0, 0), width, height, fill=False))
+    axis.add_patch(Rectangle((0, 0), width, height, fill=False, linestyle="-" if trial.scene.arena.walls else "--"))
     length = next((one for one in (100, 50, 10) if one <= width / 3), 10)
     edge = 0.06 * height
     axis.plot([width - length, width], [-edge, -edge], "k", linewidth=2, solid_capstyle="butt")

@@ -51,7 +51,7 @@ struct patch {
 // A camera in a scene. `set_viewpoint` sets the fields from `discs` on.
 struct view {
     f64 camera_ahead, camera_height, wall_height, nearest;
-    f64 width, height, range, widest, yaw;
+    f64 width, height, range, widest, yaw; // width and height are infinite without walls
     i64 own, robots, objects, is_furnished;
     const i64 *lit; // lit LEDs of each robot; null if cameras do not see LEDs
     const struct led *led_positions;
@@ -290,8 +290,9 @@ static i64 robot_class(const struct view *v, const struct disc *robot, f64 slope
 // Set the pixel class of each ray.
 void classify_rays(const struct view *v, const struct rays *rays)
 {
-    f64 east = 1 / max(v->width - v->x, v->nearest), west = -1 / max(v->x, v->nearest);
-    f64 north = 1 / max(v->height - v->y, v->nearest), south = -1 / max(v->y, v->nearest);
+    int is_walled = v->width < __builtin_inf();
+    f64 east = 1 / max(v->width - v->x, v->nearest), west = is_walled ? -1 / max(v->x, v->nearest) : 0;
+    f64 north = 1 / max(v->height - v->y, v->nearest), south = is_walled ? -1 / max(v->y, v->nearest) : 0;
     f64 over = v->wall_height - v->camera_height;
     for (i64 i = 0; i < rays->count; i++) {
         f64 slope = rays->left[i], a = 1 + slope * slope, length = sqrt(a);
@@ -299,7 +300,7 @@ void classify_rays(const struct view *v, const struct rays *rays)
                        max(v->sin * north + v->cos * north * slope, v->sin * south + v->cos * south * slope));
         near = min(near, 1 / v->nearest);
         struct pixel p = {rays->up[i], v->is_furnished ? 1 / max(near, 1e-12) : __builtin_inf(), WALL};
-        if (p.rise > over * near)
+        if (p.rise > over * near || (!is_walled && p.rise == 0))
             p.seen = ABOVE;
         else if (p.rise < -v->camera_height * near)
             p.seen = FLOOR;
@@ -329,6 +330,8 @@ void classify_rays(const struct view *v, const struct rays *rays)
 static f64 wall_depth(const struct view *v, f64 slope)
 {
     f64 east = v->cos - slope * v->sin, north = v->sin + slope * v->cos, inf = __builtin_inf();
+    if (v->width == inf)
+        return inf;
     f64 to_x = east > 0 ? (v->width - v->x) / east : east < 0 ? -v->x / east : inf;
     f64 to_y = north > 0 ? (v->height - v->y) / north : north < 0 ? -v->y / north : inf;
     return max(min(to_x, to_y), v->nearest);

@@ -194,7 +194,7 @@ class Renderer:
         self._sides: Final = (_Side * (len(bodies.outlines) + sum(map(len, bodies.polygon_corners))))()
         self._view: Final = _View(
             dimensions.CAMERA_AHEAD, dimensions.CAMERA_HEIGHT, dimensions.WALL_HEIGHT, NEAREST,
-            scene.arena.width_cm, scene.arena.height_cm, scene.camera.range_cm, self.lens.widest, traits.yaw,
+            *scene.arena.extent, scene.camera.range_cm, self.lens.widest, traits.yaw,
             own, scene.robots.count, len(bodies.objects), scene.is_furnished,
             self.leds.ctypes.data if scene.camera.sees_leds else None, bodies.led_positions,
             len(bodies.led_positions), *bodies.led_classes, dimensions.LED_COS,

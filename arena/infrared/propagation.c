@@ -34,7 +34,7 @@ struct polygon {
 struct optics {
     f64 law_counts, law_from, law_power, max_counts, min_counts; // as in propagation.py
     f64 gain, per_emitter, emitter_power, receiver_power;
-    f64 width, height, wall_share, range;
+    f64 width, height, wall_share, range; // width and height are infinite without walls
     f64 bearings[SENSORS];
     const struct disc *robots;
     const struct disc *objects;
@@ -163,7 +163,9 @@ i64 signal(const struct optics *o, const struct poses *p, i64 own, i64 other, f6
 
 static f64 wall_distance(f64 at, f64 direction, f64 size)
 {
-    return direction == 0 ? __builtin_inf() : ((direction > 0 ? size : 0) - at) / direction;
+    if (direction == 0 || size == __builtin_inf())
+        return __builtin_inf();
+    return ((direction > 0 ? size : 0) - at) / direction;
 }
 
 // Compute what the axis of a sensor hits: cm from the robot's edge, and reflection as a share of white paper's; infinity

@@ -164,7 +164,7 @@ class Optics:
         self._optics = _Optics(
             LAW_COUNTS, LAW_FROM_CM, LAW_POWER, MAX_COUNTS, MIN_COUNTS,
             setting.signal_gain, 1 / brightest(setting.emitter_power), setting.emitter_power, setting.receiver_power,
-            scene.arena.width_cm, scene.arena.height_cm, setting.wall_share, dimensions.IR_RANGE,
+            *scene.arena.extent, setting.wall_share, dimensions.IR_RANGE,
             (c_double * SENSORS)(*_BEARINGS), self._robots, self._objects,
             self._fixed, len(fixed), self._sides, len(sides), self._polygons, len(shaped),
         )  # fmt: skip

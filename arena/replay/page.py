@@ -68,6 +68,7 @@ def trial_data(trial: Trial) -> dict[str, Any]:
         "width": trial.scene.arena.width_cm,
         "height": trial.scene.arena.height_cm,
         "polygon": trial.scene.arena.polygon,
+        "walls": trial.scene.arena.walls,
         "kinds": [
             {"name": one.name, "radius": one.radius_cm, "colour": _css(one.colour),
              "polygon": geometry.centred(one.polygon) if one.polygon else ()}

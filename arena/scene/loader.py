@@ -394,6 +394,8 @@ def _checked(scene: Scene, errors: TableErrors) -> Scene:
         check_start_poses(errors, "robot_poses", scene.start.robot_poses, [3] * scene.robots.count)
         sizes = [3 if scene.kind_of(number).polygon else 2 for number in range(scene.objects.count)]
         check_start_poses(errors, "object_poses", scene.start.object_poses, sizes)
+    if scene.arena.polygon and not scene.arena.walls:
+        raise errors.at("arena", "walls", "arena.walls = false has no effect beside `polygon`; remove one of them")
     if scene.arena.polygon:
         check_polygon(errors, "arena", scene.arena.polygon, None)
         if min(value for point in scene.arena.polygon for value in point) < 0:

@@ -61,7 +61,7 @@ def place_all(scene: Scene, rng: np.random.Generator) -> tuple[list[tuple[float,
     chosen = [marks[index] for index in rng.permutation(len(marks))[: len(radii)]]
     for index, ((x, y), radius) in enumerate(zip(chosen, radii, strict=True)):
         nearest = min(x, y, scene.arena.width_cm - x, scene.arena.height_cm - y)
-        if nearest < radius:
+        if nearest < radius and scene.arena.walls:
             where = f"the mark at ({x:g}, {y:g}) cm is nearer to a wall than {radius:g} cm"
             raise SceneError(f"{scene.name}: no room: {where}")
         for (other_x, other_y), other in zip(chosen[:index], radii[:index], strict=True):
@@ -139,9 +139,9 @@ def obstruction(
     `outlines` are those of the scene; `taken` are other discs: x, y, radius. A movable polygon counts as its
     circumscribed circle."""
     arena = scene.arena
-    if not (0 < x < arena.width_cm and 0 < y < arena.height_cm):
+    if arena.walls and not (0 < x < arena.width_cm and 0 < y < arena.height_cm):
         return "is outside the walls"
-    if min(x, y, arena.width_cm - x, arena.height_cm - y) < radius:
+    if arena.walls and min(x, y, arena.width_cm - x, arena.height_cm - y) < radius:
         return "is in a wall"
     if arena.polygon and not geometry.contains(arena.polygon, x, y):
         return "is outside the walls"

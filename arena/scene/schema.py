@@ -27,11 +27,21 @@ FCY: Final = 14_745_600
 
 @dataclass(frozen=True, slots=True)
 class Arena:
-    """Inner size between the walls, or the corners of a room of any shape. A polygon determines the size."""
+    """Inner size between the walls, or the corners of a room of any shape. A polygon determines the size.
+
+    Without `walls` the world has no end. Robots can leave the rectangle, which then only defines start positions and
+    the part of the world in pictures. Cameras see floor and sky up to the horizon.
+    """
 
     width_cm: float = 400.0
     height_cm: float = 300.0
     polygon: Points = ()
+    walls: bool = True
+
+    @property
+    def extent(self) -> tuple[float, float]:
+        """Width and height between the walls, cm; infinite without walls."""
+        return (self.width_cm, self.height_cm) if self.walls else (math.inf, math.inf)
 
 
 @dataclass(frozen=True, slots=True)

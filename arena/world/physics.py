@@ -168,7 +168,8 @@ class World:
         self.space = pymunk.Space()
         self.space.iterations = ITERATIONS
         self.space.collision_slop = COLLISION_SLOP
-        self._add_walls()
+        if scene.arena.walls:
+            self._add_walls()
         self._add_obstacles()
         self._kinds: list[RobotKind] = [scene.robot_kind(robot) for robot in range(len(robots))]
         self._drives: dict[str, Drive] = {kind.name: kind.drive(getattr(scene, kind.table)) for kind in self._kinds}

@@ -60,7 +60,7 @@ class ReferenceCamera:
         self._y = y + dimensions.CAMERA_AHEAD * self._sin
         if traits.yaw:
             self._cos, self._sin = math.cos(heading + traits.yaw), math.sin(heading + traits.yaw)
-        self._width, self._height = scene.arena.width_cm, scene.arena.height_cm
+        self._width, self._height = scene.arena.extent
         self._range = scene.camera.range_cm
         self.lens = lens_of(scene.camera, traits.pitch_deg)
         self.discs: Final[list[Disc]] = []
@@ -170,7 +170,9 @@ class ReferenceCamera:
         return self._appearance.floor_at(x, y)
 
     def wall_depth(self, slope: float) -> float:
-        """Return the depth at which a ray hits a wall."""
+        """Return the depth at which a ray hits a wall; infinite without walls."""
+        if math.isinf(self._width):
+            return math.inf
         east = self._cos - slope * self._sin
         north = self._sin + slope * self._cos
         to_x = (self._width - self._x) / east if east > 0 else -self._x / east if east < 0 else math.inf

@@ -101,7 +101,11 @@ function drawGround() {
     g.lineTo(X(one.x), Y(one.y) + 9); g.stroke(); });
   g.strokeStyle = INK; g.lineWidth = 2;
   if (d.polygon.length) { shape({polygon: d.polygon}); g.stroke(); }
-  else g.strokeRect(X(0), Y(d.height), d.width * scale, d.height * scale);
+  else {
+    if (!d.walls) g.setLineDash([4, 4]);
+    g.strokeRect(X(0), Y(d.height), d.width * scale, d.height * scale);
+    g.setLineDash([]);
+  }
   g.lineWidth = 1;
   d.obstacles.forEach(one => { shape(one, one.colour); g.stroke(); });
   const bar = [100, 50, 10].find(one => one <= d.width / zoom / 3) || 1, foot = canvas.clientHeight - 10;

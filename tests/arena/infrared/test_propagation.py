@@ -152,7 +152,8 @@ def plain_surfaces(scene: Scene, poses: Poses, robot: int) -> list[tuple[float, 
     x, y, heading = poses.robots[robot]
     width, height = scene.arena.width_cm, scene.arena.height_cm
     corners = [(0.0, 0.0), (width, 0.0), (width, height), (0.0, height)]
-    room = geometry.sides(corners) + (geometry.sides(scene.arena.polygon) if scene.arena.polygon else [])
+    room = geometry.sides(corners) if scene.arena.walls else []
+    room += geometry.sides(scene.arena.polygon) if scene.arena.polygon else []
     sides = [(side, scene.infrared.wall_share) for side in room]
     sides += [(side, one.share) for one in scene.obstacles if one.polygon for side in geometry.sides(one.polygon)]
     kinds = map(scene.kind_of, range(len(poses.objects)))
@@ -174,16 +175,19 @@ def plain_surfaces(scene: Scene, poses: Poses, robot: int) -> list[tuple[float, 
             if along > 0 and abs(aside) < radius:
                 half = math.sqrt(radius * radius - aside * aside)
                 met.append((along - half, share * half / radius))
-        distance, share = min(met)
+        distance, share = min(met, default=(math.inf, 0.0))
         gap = max(distance - dimensions.ROBOT_RADIUS, 0.0)
         found.append((10 * gap, share) if gap <= dimensions.IR_RANGE else (math.inf, 0.0))
     return found
 
 
-def test_native_propagation_equals_the_reference() -> None:
+@pytest.mark.parametrize("walls", [True, False])
+def test_native_propagation_equals_the_reference(walls: bool) -> None:
     """Native propagation gives the signals and surfaces of the reference for random robots and objects in a yard with
-    all kinds of obstacles."""
+    all kinds of obstacles, with and without walls around it."""
     scene = load_scene("avoidance").with_values(infrared__wall_share=0.7)
+    if not walls:
+        scene = replace(scene, arena=replace(scene.arena, polygon=(), walls=False))
     kinds = load_scene("foraging").kinds
     scene = replace(scene, kinds=kinds, objects=replace(scene.objects, count=6))
     optics, count = Optics(scene), 0
