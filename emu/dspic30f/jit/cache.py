@@ -15,7 +15,7 @@ from emu.host.disk_cache import DiskCache
 from emu.host.paths import native_code
 
 LIMIT_BYTES: Final = 128 << 20
-"""Maximum total size in bytes: about 25,000 objects, of 5 kB on average and at most 55 kB each."""
+"""Maximum total size in bytes: about 60,000 objects, compressed to 2 kB on average."""
 
 
 @cache

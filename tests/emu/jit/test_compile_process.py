@@ -15,8 +15,9 @@ import pytest
 
 from emu.dspic30f.jit import compiler as compiler_module
 from emu.dspic30f.jit.cache import ObjectCache
-from emu.dspic30f.jit.compiler import MAX_DEATHS, Compiler, LoadedCode
+from emu.dspic30f.jit.compiler import MAX_DEATHS, Compiler, LoadedCode, pack_object, unpack_object
 from emu.dspic30f.jit.engine import JitEngine
+from emu.dspic30f.jit.worker import Backend
 from emu.host.disk_cache import SHELVES
 from emu.machine.machine import Machine
 from tests.emu.jit.comparison.engine_pair import load
@@ -229,6 +230,14 @@ double scaled(double value, long which) { calls++; return value * factors[which 
     run = [sys.executable, "-c", FRAGMENTED.format(source=str(source))]
     done = subprocess.run(run, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stdout) == (0, "[3.25, 5.25, 7.25, 9.25]\n"), done.stderr
+
+
+def test_objects_are_compressed() -> None:
+    """A packed object has at most half the size of its code, and unpacks to the same code and entries."""
+    code = Backend().compile(IR.format(1), 0)
+    packed = pack_object([0x100, 0x8000], code)
+    assert len(packed) < len(code) / 2
+    assert unpack_object(packed) == ([0x100, 0x8000], code)
 
 
 def test_the_folder_keeps_what_was_used_last(tmp_path: Path) -> None:
