@@ -2,12 +2,14 @@
 
 The site contains every Markdown file of the repository at its own path, so links work on GitHub and on the site.
 Generated pages are added: the output of `--help`, the Python interfaces from docstrings, the import graph, the kernel's
-calls and a list of all pages. The pages can be opened from disk. MkDocs builds in strict mode: a warning is a failure.
+calls and a list of all pages. Each option of a command and each key of a scene has its own anchor, which the search
+finds. The pages can be opened from disk. MkDocs builds in strict mode: a warning is a failure.
 """
 
 from __future__ import annotations
 
 import argparse
+import html
 import os
 import re
 import shutil
@@ -23,6 +25,9 @@ import python_reference
 ROOT = Path(__file__).resolve().parents[2]
 PROGRAMS = ("emu", "toolchain", "arena", "openswarm")
 LINK = re.compile(r"(\]\()([^)\s]+)(\))")
+OPTION = re.compile(r"^ {2,4}(-\S.*?)(?: {2,}(\S.*))?\n((?: {10,}\S.*\n)*)", re.MULTILINE)
+"""An option in the output of `--help`: its names and arguments, the first line of its text, the other lines."""
+KEYS = Path("docs/scene-keys.md")
 
 
 def tracked() -> list[str]:
@@ -45,6 +50,7 @@ def copy_pages(source: Path) -> None:
                 beside = source / place.relative_to(ROOT)
                 beside.parent.mkdir(parents=True, exist_ok=True)
                 shutil.copy(place, beside)
+        text = with_anchors(text) if name == str(KEYS) else text
         (source / name).write_text(with_pages(text, path), encoding="utf-8")
 
 
@@ -60,6 +66,36 @@ def to_page(page: Path, target: str) -> str:
     return f"{place.rstrip('/')}/README.md{hash_}{anchor}" if is_folder else target
 
 
+def with_anchors(text: str) -> str:
+    """Return the page of scene keys with a heading in each row: `camera.sensor`, `robots[].count` for [[robots]]."""
+    lines, table = [], ""
+    for line in text.splitlines():
+        found = re.match(r"## \[(\[?)(\w+)\]+$", line)
+        table = found[2] + "[]" * bool(found[1]) if found else table
+        lines.append(re.sub(r"^\| `(\w+)` \|", rf'| <h5 id="{table}.\1">{table}.\1</h5> |', line))
+    return "\n".join(lines) + "\n"
+
+
+def options_of(command: str, said: str) -> str:
+    """Return the `--help` output of a command in Markdown, with a heading for each option: `emu run --seconds S`."""
+    parts, end = [], 0
+    for found in OPTION.finditer(said):
+        names, first, more = found.groups(default="")
+        anchor = command.replace(" ", "-") + re.findall(r"(?<!\S)-[\w-]+", names)[-1]
+        parts.append(_block(said[end : found.start()]))
+        parts.append(f'<h5 id="{anchor}">{html.escape(f"{command} {names}")}</h5>\n')
+        parts.append(f"<p>{html.escape(' '.join(f'{first} {more}'.split()))}</p>\n")
+        end = found.end()
+    return "\n".join(filter(None, [*parts, _block(said[end:])]))
+
+
+def _block(text: str) -> str:
+    """Return a part of a help text in Markdown: a title of options in bold, any other text as a block of code."""
+    text = re.sub(r"\n*^options:$", "", text.strip("\n"), flags=re.MULTILINE)
+    title = re.fullmatch(r"(\w[\w ]*):", text)
+    return f"**{title[1]}**\n" if title else f"```text\n{text}\n```\n" if text else ""
+
+
 def help_of(program: str) -> str:
     """Return a page with the `--help` output of a program and each of its commands."""
 
@@ -71,8 +107,8 @@ def help_of(program: str) -> str:
 
     whole = said()
     names = re.findall(r"^ {2,4}([a-z]+) {2,}\S", whole, re.MULTILINE)
-    parts = [f"# {program}\n\n```text\n{whole}```\n"]
-    parts += [f"## {program} {name}\n\n```text\n{said(name)}```\n" for name in names]
+    parts = [f"# {program}\n\n{options_of(program, whole)}"]
+    parts += [f"## {program} {name}\n\n{options_of(f'{program} {name}', said(name))}" for name in names]
     return "\n".join(parts)
 
 

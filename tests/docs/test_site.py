@@ -1,8 +1,10 @@
-"""The documentation site builds without a warning, links to every page, and has an anchor for every kernel call."""
+"""The documentation site builds without a warning and links to every page. Its search finds kernel calls, options and
+keys of scenes at their own anchors."""
 
 from __future__ import annotations
 
 import importlib.util
+import json
 import re
 import subprocess
 import sys
@@ -61,6 +63,27 @@ def test_every_kernel_call_has_an_anchor(site: Path) -> None:
         declared.update(re.findall(r"^(?:#define |[\w ]+[ *])(Sys_\w+)\(", code, re.MULTILINE))
     assert len(declared) > 60
     assert sorted(name for name in declared if f'id="{name}"' not in text) == []
+
+
+@pytest.mark.slow
+def test_the_search_finds_options_and_keys_at_their_own_anchors(site: Path) -> None:
+    """Every `--option` of a command's usage and every key of a scene is an entry of the search, with an anchor."""
+    entries = json.loads((site / "search/search_index.json").read_text(encoding="utf-8"))["docs"]
+    titles = {entry["location"]: entry["title"] for entry in entries}
+    for program in ("emu", "toolchain", "arena", "openswarm"):
+        text = (site / f"reference/{program}.html").read_text(encoding="utf-8")
+        usages = re.findall(r"usage: ([a-z]+ [a-z]+) (.*?)\n\n", re.sub("<[^>]+>", "", text), re.DOTALL)
+        assert len(usages) > 3
+        for command, usage in usages:
+            options = set(re.findall(r"(?<=[\[ ])--[a-z][\w-]+", usage))
+            anchors = {option: f"reference/{program}.html#{command.replace(' ', '-')}{option}" for option in options}
+            assert [one for one, anchor in sorted(anchors.items()) if anchor not in titles] == [], command
+            assert all(titles[anchor].startswith(f"{command} -") for anchor in anchors.values())
+    keys = re.findall(r"^\| `(\w+)` \|", (ROOT / "docs/scene-keys.md").read_text(encoding="utf-8"), re.MULTILINE)
+    found = [title for location, title in titles.items() if location.startswith("docs/scene-keys.html#")]
+    assert len(keys) > 100
+    assert [key for key in keys if not any(title.endswith(f".{key}") for title in found)] == []
+    assert titles["docs/scene-keys.html#infrared.lost_share"] == "infrared.lost_share"
 
 
 def _html(page: str) -> str:
