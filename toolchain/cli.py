@@ -8,7 +8,6 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 from importlib import import_module
-from importlib.metadata import version
 from pathlib import Path
 
 from emu.host.errors import JSON, report_error
@@ -77,6 +76,8 @@ def by_name() -> int:
         name = XC16_PROGRAMS.get(name.partition("-")[2], name.partition("-")[2])
         words = ["--xc16-defaults", *words] if name == "cc" and "--version" not in words else words
     if name != "cc" and words == ["--version"]:
+        from importlib.metadata import version  # imported only here: it takes as long as a short run
+
         print(f"dspic-{name} (openswarm) {version('openswarm')}")
         return DONE
     return main(["ar", "s", *words] if name == "ranlib" and "--help" not in words else [name, *words])

@@ -20,7 +20,7 @@ from toolchain.errors import ToolError
 
 _LABEL = re.compile(r"\s*([A-Za-z_.$][\w.$]*|\d+)\s*:")
 _ASSIGN = re.compile(r"\s*([A-Za-z_.$][\w.$]*)\s*=(?!=)\s*(.*)", re.DOTALL)
-_STATEMENT = re.compile(r"\s*([A-Za-z_.$][\w.$]*)\s*(.*?)\s*$", re.DOTALL)
+_STATEMENT = re.compile(r"\s*([A-Za-z_.$][\w.$]*)\s*(.*)", re.DOTALL)
 
 
 def assemble(text: str, file: str = "<text>", options: Options | None = None) -> tuple[ObjectFile, list[str]]:
@@ -63,7 +63,7 @@ def _statement(asm: Assembler, line: str) -> None:
         if rest:
             raise ExprError(f"cannot read {rest!r}: expected a label, directive or instruction")
         return
-    word, operands = match.groups()
+    word, operands = match[1], match[2].rstrip()
     if operands[:1] == "=" and (assignment := _ASSIGN.match(line)):
         set_symbol(asm, assignment[1], assignment[2])
     elif (macro := asm.macros.get(word.lower())) is not None:
@@ -92,7 +92,7 @@ def _skip(asm: Assembler, line: str) -> None:
     """Process a line inside a false conditional: only conditionals have an effect."""
     match = _STATEMENT.match(line)
     if match and match[1][0] == "." and match[1].lower() in CONDITIONALS:
-        asm.conditionals.process(match[1].lower(), match[2], asm.source.place, asm)
+        asm.conditionals.process(match[1].lower(), match[2].rstrip(), asm.source.place, asm)
 
 
 def _call_macro(asm: Assembler, macro: Macro, operands: str) -> None:

@@ -13,7 +13,7 @@ import tempfile
 from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from functools import cache, partial
-from importlib.metadata import version
+from importlib.util import find_spec
 from pathlib import Path
 
 from emu.host.paths import runtime_libraries
@@ -62,12 +62,28 @@ def fingerprint() -> str:
 @cache
 def _hash_of(dependencies: tuple[Dependency, ...]) -> str:
     """Hash of the content of files; cached for equal sizes and times of modification, as a process may link often."""
-    digest = hashlib.sha256(f"{version('ziglang')} {version('llvmlite')} {sys.version_info[:2]}".encode())
+    packages = f"{_installed('ziglang')} {_installed('llvmlite')}"
+    digest = hashlib.sha256(f"{packages} {sys.version_info[:2]}".encode())
     root = Path(__file__).parents[2]
     for parts, _, _ in dependencies:
         name = "/".join(parts)
         digest.update(name.encode() + b"\0" + (root / name).read_bytes())
     return digest.hexdigest()[:20]
+
+
+def _installed(package: str) -> str:
+    """Name and version of an installed package, from the name of its metadata folder.
+
+    The import of importlib.metadata takes as long as a short run.
+    """
+    spec = find_spec(package)
+    site = Path(spec.origin).parents[1] if spec is not None and spec.origin is not None else None
+    folders = sorted(path.name for path in site.glob(f"{package}-*.dist-info")) if site is not None else []
+    if folders:
+        return " ".join(folders)
+    from importlib.metadata import version
+
+    return version(package)
 
 
 def _dependencies(root: str) -> Iterator[Dependency]:

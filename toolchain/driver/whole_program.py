@@ -20,7 +20,10 @@ VISIBLE_LINKAGES = {llvm.Linkage.external, llvm.Linkage.weak_any, llvm.Linkage.w
 BITCODE_MAGIC = b"BC\xc0\xde"
 DECLARED = re.compile(r"^declare [^@\n]*@([\w$.]+)\(", re.MULTILINE)
 ATTRIBUTES = re.compile(rb"^attributes #\d+ = \{", re.MULTILINE)
-NAMES_SYMBOLS = re.compile(r' asm | c"preprologue:| c"save:')
+INLINE_ASSEMBLY = re.compile(r" asm (.*)")
+PREPROLOGUE = re.compile(r'c"preprologue:(.*)')
+SAVED_NAMES = re.compile(r'c"save:(.*)')
+OCTET = re.compile(r"\\[0-9A-Fa-f]{2}")
 USED_TABLES = ("llvm.used", "llvm.compiler.used")
 GLOBAL_NAME = re.compile(r"ptr @([\w$.]+)")
 C_NAME = re.compile(r"\b([A-Za-z_]\w*)")
@@ -87,11 +90,9 @@ def names_used(objects: Iterable[tuple[str, bytes]]) -> set[str]:
 def names_in_inline_assembly(text: str) -> set[str]:
     """C names that occur as `_name` in inline assembly and `preprologue` annotations, or in `save` annotations."""
     names: set[str] = set()
-    for line in text.splitlines():
-        found = NAMES_SYMBOLS.search(line)
-        if found:
-            quoted = re.sub(r"\\[0-9A-Fa-f]{2}", " ", line[found.start() :])
-            names.update((C_NAME if found[0].endswith("save:") else ASSEMBLER_NAME).findall(quoted))
+    for pattern, name in ((INLINE_ASSEMBLY, ASSEMBLER_NAME), (PREPROLOGUE, ASSEMBLER_NAME), (SAVED_NAMES, C_NAME)):
+        for line in pattern.findall(text):
+            names.update(name.findall(OCTET.sub(" ", line)))
     return names
 
 

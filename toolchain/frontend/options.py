@@ -10,7 +10,6 @@ import re
 import shlex
 import sys
 from dataclasses import dataclass, field
-from importlib.metadata import version
 from pathlib import Path
 
 from emu.chips import chip_named
@@ -392,7 +391,11 @@ def _answer(word: str) -> str:
     if name == "-print-search-dirs":
         return f"install: {package}\nprograms: ={programs}\nlibraries: ={package / 'runtime'}"
     answers = {"-print-libgcc-file-name": "libdspic.a", "-print-multi-lib": ".;", "-dumpmachine": "pic30-elf"}
-    return answers[name] if name in answers else version("openswarm")
+    if name in answers:
+        return answers[name]
+    from importlib.metadata import version  # imported only here: it takes as long as a short run
+
+    return version("openswarm")
 
 
 def _front_end(options: CcOptions, word: str, words: _ArgumentCursor, row: OptionRow) -> None:

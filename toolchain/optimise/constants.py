@@ -5,6 +5,9 @@ Needs: virtual registers. A shared constant has a single definition, so the allo
 
 from __future__ import annotations
 
+from functools import reduce
+from operator import or_
+
 from toolchain.ir.cfg import natural_loops
 from toolchain.mir.function import MBlock, MFunction
 from toolchain.mir.instruction import MI
@@ -82,6 +85,8 @@ def _hoist_from_loops(m: MFunction, counts: dict[int, int]) -> None:
     loops = natural_loops(succs, m.blocks[0].name)
     blocks = m.block_map()
     out = None
+    used: dict[str, int] = {}
+    """Bit set of the registers that each block reads."""
     for header, body in sorted(loops.items(), key=lambda e: len(e[1])):
         if any(other != header and other in body for other in loops):
             continue
@@ -90,9 +95,14 @@ def _hoist_from_loops(m: MFunction, counts: dict[int, int]) -> None:
         entry = _entry(blocks, succs, header, body)
         if entry is None:
             continue
-        out = out if out is not None else live_out(m)
+        if out is None:
+            out = live_out(m)
+            used = {b.name: _registers_read(b) for b in m.blocks}
         room = LOOP_REGISTERS - max(out[n].bit_count() for n in body) - 2
-        _hoist(m, entry, [blocks[n] for n in succs if n in body], counts, room)
+        outside = reduce(or_, (read for name, read in used.items() if name not in body), 0)
+        inside = [blocks[n] for n in succs if n in body]
+        _hoist(entry, inside, counts, room, outside)
+        used |= {b.name: _registers_read(b) for b in inside}
 
 
 def _entry(blocks: dict[str, MBlock], succs: dict[str, list[str]], header: str, body: set[str]) -> MBlock | None:
@@ -103,14 +113,20 @@ def _entry(blocks: dict[str, MBlock], succs: dict[str, list[str]], header: str, 
     return blocks[outside[0]]
 
 
-def _hoist(m: MFunction, entry: MBlock, body: list[MBlock], counts: dict[int, int], room: int) -> None:
+def _registers_read(b: MBlock) -> int:
+    """Bit set of the registers that a block reads."""
+    return reduce(or_, (mi.register_sets()[0] for mi in b.insts), 0)
+
+
+def _hoist(entry: MBlock, body: list[MBlock], counts: dict[int, int], room: int, outside: int) -> None:
+    """Move constants of a loop to `entry`, except those in registers that code outside the loop reads (`outside`)."""
     found: dict[LoadKey, int] = {}
     rename: dict[int, int] = {}
     for b in body:
         kept: list[MI] = []
         for mi in b.insts:
             key = _key(mi, counts)
-            if key is None or (key not in found and len(found) >= room) or _used_outside(m, mi, body):
+            if key is None or (key not in found and len(found) >= room) or outside >> mi.register(-1) & 1:
                 kept.append(mi)
                 continue
             r = mi.register(-1)
@@ -124,10 +140,3 @@ def _hoist(m: MFunction, entry: MBlock, body: list[MBlock], counts: dict[int, in
         for b in body:
             for mi in b.insts:
                 mi.map_registers(rename)
-
-
-def _used_outside(m: MFunction, mi: MI, body: list[MBlock]) -> bool:
-    """Whether the register of a constant is used outside the loop."""
-    r = mi.args[-1]
-    names = {b.name for b in body}
-    return any(r in x.uses() for b in m.blocks if b.name not in names for x in b.insts)

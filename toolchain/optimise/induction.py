@@ -52,11 +52,38 @@ def run(f: Function) -> None:
             for counter in _counters(loop):
                 _make_pointers(loop, counter)
     dead_code(f)
+    uses = UseIndex(f)
     for loop, _ in _loops(f):
         for counter in _counters(loop):
-            _unclamp(loop, counter)
-            _count_down(loop, counter)
+            _unclamp(loop, counter, uses)
+            _count_down(loop, counter, uses)
     dead_code(f)
+
+
+class UseIndex:
+    """Users of every value of a function, once per operand; rewrites change operands through it."""
+
+    def __init__(self, f: Function) -> None:
+        self._users: dict[int, list[Instr]] = {}
+        for b in f.blocks:
+            for i in b.instrs:
+                self.add(i)
+
+    def of(self, v: Value) -> list[Instr]:
+        """Return the instructions that use a value."""
+        return self._users.get(id(v), [])
+
+    def add(self, i: Instr) -> None:
+        """Add a new instruction."""
+        for a in i.args:
+            self._users.setdefault(id(a), []).append(i)
+
+    def set_args(self, i: Instr, args: list[Value]) -> None:
+        """Replace the operands of an instruction."""
+        for a in i.args:
+            self._users[id(a)].remove(i)
+        i.args = args
+        self.add(i)
 
 
 def _loops(f: Function) -> list[tuple[CountedLoop, bool]]:
@@ -237,31 +264,31 @@ def _equal(a: Value, b: Value) -> bool:
     return isinstance(a, ConstInt) and isinstance(b, ConstInt) and a.value == b.value
 
 
-def _unclamp(loop: CountedLoop, counter: InductionVariable) -> None:
+def _unclamp(loop: CountedLoop, counter: InductionVariable, uses: UseIndex) -> None:
     """Replace the exit test i == max(n, start) of a loop in steps of one from `start` by i >= n."""
-    test = _exit_test(loop)
+    test = _exit_test(loop, uses)
     if counter.amount != 1 or test is None or test.args[0] is not counter.phi or not _leaves_at(loop, test):
         return
     n = _unclamped(test.args[1], counter.start)
     if n is not None:
-        test.args = [counter.phi, n]
+        uses.set_args(test, [counter.phi, n])
         test.extra["pred"] = "sge" if test.pred == "eq" else "slt"
 
 
-def _exit_test(loop: CountedLoop) -> Instr | None:
+def _exit_test(loop: CountedLoop, uses: UseIndex) -> Instr | None:
     """The comparison for equality that only the branch at the end of the header uses, or None."""
     br = loop.header.instrs[-1]
     test = br.args[0] if br.op == "br" and br.args else None
     if not isinstance(test, Instr) or test.op != "icmp" or test.pred not in ("eq", "ne"):
         return None
-    return test if len(_users(loop.f, test)) == 1 else None
+    return test if len(uses.of(test)) == 1 else None
 
 
-def _count_down(loop: CountedLoop, counter: InductionVariable) -> None:
+def _count_down(loop: CountedLoop, counter: InductionVariable, uses: UseIndex) -> None:
     """Let a counter that only the exit test uses count down to zero."""
     if counter.amount != 1:
         return
-    tests = {id(u): u for v in (counter.phi, counter.step) for u in _users(loop.f, v)}
+    tests = {id(u): u for v in (counter.phi, counter.step) for u in uses.of(v)}
     tests.pop(id(counter.step), None)
     tests.pop(id(counter.phi), None)
     if len(tests) != 1:
@@ -270,7 +297,7 @@ def _count_down(loop: CountedLoop, counter: InductionVariable) -> None:
     if test.op != "icmp" or test.args[0] not in (counter.phi, counter.step):
         return
     if test.pred in ("sge", "slt"):
-        _count_down_signed(loop, counter, test)
+        _count_down_signed(loop, counter, test, uses)
         return
     if test.pred not in ("eq", "ne"):
         return
@@ -280,28 +307,31 @@ def _count_down(loop: CountedLoop, counter: InductionVariable) -> None:
     last = loop.entry.instrs.pop()
     b = IrBuilder(loop.entry)
     b.line = last.line
+    before = len(loop.entry.instrs)
     distance = b.binary("sub", limit, counter.start)
+    for made in loop.entry.instrs[before:]:
+        uses.add(made)
     loop.entry.instrs.append(last)
-    _start_at(loop, counter, distance)
-    test.args = [test.args[0], const(I16, 0)]
+    _start_at(loop, counter, distance, uses)
+    uses.set_args(test, [test.args[0], const(I16, 0)])
 
 
-def _count_down_signed(loop: CountedLoop, counter: InductionVariable, test: Instr) -> None:
+def _count_down_signed(loop: CountedLoop, counter: InductionVariable, test: Instr, uses: UseIndex) -> None:
     """Let a counter that starts at 0 or 1, with the exit test i >= n, count down from n; n - i could overflow."""
     n, start = test.args[1], counter.start
     if test.args[0] is not counter.phi or not _leaves_at(loop, test) or not loop.invariant(n):
         return
     if isinstance(start, ConstInt) and start.value in (0, 1):
-        _start_at(loop, counter, n)
-        test.args = [counter.phi, start]
+        _start_at(loop, counter, n, uses)
+        uses.set_args(test, [counter.phi, start])
         test.extra["pred"] = "sle" if test.pred == "sge" else "sgt"
 
 
-def _start_at(loop: CountedLoop, counter: InductionVariable, start: Value) -> None:
+def _start_at(loop: CountedLoop, counter: InductionVariable, start: Value, uses: UseIndex) -> None:
     """Let the counter start at `start` and count down."""
-    counter.phi.args = [start if n == loop.entry.name else v
-                        for v, n in zip(counter.phi.args, counter.phi.blocks, strict=True)]  # fmt: skip
-    counter.step.args = [counter.phi, const(I16, -1)]
+    phi = counter.phi
+    uses.set_args(phi, [start if n == loop.entry.name else v for v, n in zip(phi.args, phi.blocks, strict=True)])
+    uses.set_args(counter.step, [phi, const(I16, -1)])
     for record in loop.f.dbg_records:
         if record.value is counter.phi or record.value is counter.step:
             record.value = None  # the source variable counts up, so its value is unknown

@@ -18,6 +18,8 @@ Handler = Callable[[Assembler, str], None]
 
 _NUMBER = re.compile(r"0|[1-9][0-9]*|0x[0-9A-Fa-f]+")
 """The most frequent operands, which need no parser. A leading 0 starts an octal number, which `int` would refuse."""
+_NUMBERS = re.compile(r"(?:0|[1-9][0-9]*)(?:,(?:0|[1-9][0-9]*))*")
+"""Operands of most directives of a compiler."""
 
 # Relocation of a datum by its size in bytes and its operator ("": none) (abi-elf.md §5).
 _DATA_KINDS: dict[int, dict[str, str]] = {
@@ -93,6 +95,11 @@ def _integers(size: int, packed: bool = False) -> Handler:
             )
         if packed and size == 3:
             asm.section.align_word()
+        if _NUMBERS.fullmatch(text):
+            values = list(map(int, text.split(",")))
+            if max(values) <= plain.high:
+                _put(asm, b"".join([value.to_bytes(size, "little") for value in values]), packed)
+                return
         for part in split_arguments(text, spaces=False) or [""]:
             value = int(part, 0) if _NUMBER.fullmatch(part) else asm.evaluate(part)
             if isinstance(value, int):
