@@ -58,7 +58,7 @@ class StackRow:
 
 def _stacks(report: BoundsReport, start: str) -> dict[str, int | None]:
     """Return the bounds of all stacks of a report by the names of rows; `start` is the function a run begins with."""
-    found: dict[str, int | None] = {start: None} | report.stacks
+    found: dict[str, int | None] = {start: None, **report.stacks}
     for user in report.rows:
         if user.name in found:
             found[f"{user.name} alone"] = RETURN_ADDRESS + user.bytes if user.stack_is_known else None
