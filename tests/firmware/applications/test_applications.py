@@ -116,6 +116,15 @@ def test_no_application_drops_the_result_of_a_call_that_sets_it_up(app: str) -> 
         assert not SETS_UP.findall(source.read_text()), source
 
 
+def test_a_device_without_the_one_it_needs_is_refused() -> None:
+    """`DEVICES=camera` without `i2c` is refused with the line to write, not with a missing header."""
+    words = ["make", "-n", "-C", str(FIRMWARE), "APP=hello"]
+    done = subprocess.run([*words, "DEVICES=camera"], capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert "DEVICES=camera: the camera needs i2c, too: DEVICES := camera i2c" in done.stderr
+    assert subprocess.run([*words, "DEVICES=camera i2c"], capture_output=True, check=False).returncode == 0
+
+
 # ---- Faults ---------------------------------------------------------------------------------------------------------
 
 
