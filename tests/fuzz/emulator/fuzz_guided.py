@@ -2,8 +2,8 @@
 
 `python tests/fuzz/emulator/fuzz_guided.py [--kinds N] [--seed S] [--seconds T] [--format NAME] [--keep]` passes the
 files of `file_formats.py` to their commands with Atheris, one kind after the other, and exits with 1 at the first input
-with another outcome than a documented status. Each kind begins with its corpus, `tests/fuzz/corpus/KIND.zip`; `--keep`
-stores the smallest set of inputs that reach as much. Exit status 77 without Atheris.
+with another outcome than a documented status. Each kind begins with its corpus, `tests/fuzz/corpus/KIND.zip`, in which
+`--keep` stores the inputs that have reached new branches. Exit status 77 without Atheris.
 """
 
 from __future__ import annotations
@@ -28,6 +28,8 @@ LARGEST = 16_384
 """Maximum length of an input in bytes; the samples of records and images are shorter."""
 SECONDS = 4.0
 """Seconds for each kind of file, beside a start of about ten."""
+PACKAGES = ["emu", "toolchain", "arena"]
+"""Packages whose branches count, also of modules that a command imports."""
 STEADY = (1980, 1, 1, 0, 0, 0)
 """Time of all entries of an archive, so that equal corpora are equal files."""
 
@@ -53,34 +55,37 @@ def pack(kind: str, folder: Path) -> int:
     return len(inputs)
 
 
-def fuzz(kind_name: str, arguments: list[str]) -> None:
-    """Run libFuzzer with its `arguments` on one kind of file in this process, which ends with libFuzzer's status."""
+def fuzz(kind_name: str, inputs: Path, arguments: list[str]) -> None:
+    """Run libFuzzer on one kind of file in this process, which ends with libFuzzer's status.
+
+    `inputs` is the folder of the corpus, to which the valid sample is added.
+    """
     import atheris
 
-    with atheris.instrument_imports(include=["emu", "toolchain", "arena"]):
+    with tempfile.TemporaryDirectory(prefix="guided-") as name, atheris.instrument_imports(PACKAGES):
         from tests.fuzz.file_formats import Bench, damaged
 
-    with tempfile.TemporaryDirectory(prefix="guided-") as name:
         bench = Bench(Path(name))
         kind = next(one for one in bench.formats if one.name == kind_name)
+        (inputs / "sample").write_bytes(kind.sample)
 
         def attempt(data: bytes) -> None:
-            bench.attempt(kind, data or kind.sample)
+            bench.attempt(kind, data)
 
         def mutate(data: bytes, largest: int, seed: int) -> bytes:
             rng = random.Random(seed)
             if rng.random() < 0.3:
                 return bytes(atheris.Mutate(data, largest))
-            return damaged(kind, data if rng.random() < 0.9 and data else kind.sample, rng)[:largest]
+            return damaged(kind, data or kind.sample, rng)[:largest]
 
         os.chdir(name)
-        atheris.Setup([sys.argv[0], *arguments], attempt, custom_mutator=mutate)
+        atheris.Setup([sys.argv[0], *arguments, str(inputs)], attempt, custom_mutator=mutate)
         atheris.Fuzz()
 
 
 def run(kind: str, folder: Path, arguments: list[str]) -> tuple[int, str]:
-    """Fuzz one kind of file in a child process. Return its status and what it printed."""
-    command = [sys.executable, __file__, "--child", kind, *arguments]
+    """Fuzz one kind of file in a child process with the corpus `folder`/inputs. Return its status and output."""
+    command = [sys.executable, __file__, "--child", kind, str(folder / "inputs"), *arguments]
     done = subprocess.run(command, capture_output=True, text=True, errors="replace", cwd=folder, check=False)
     lines = [line for line in (done.stdout + done.stderr).splitlines() if not line.startswith("INFO: ")]
     return done.returncode, "\n".join(lines)
@@ -99,23 +104,19 @@ def explore(kind: str, seed: int, seconds: float, keep: bool) -> tuple[int, str]
             "-timeout_exitcode=1",
         ]
         ends = [f"-max_total_time={max(1, round(seconds))}", f"-seed={seed}", "-print_final_stats=1"]
-        status, said = run(kind, folder, [str(folder / "inputs"), f"-artifact_prefix={folder}/", *limits, *ends])
+        status, said = run(kind, folder, [f"-artifact_prefix={folder}/", *limits, *ends])
         tried = re.search(r"stat::number_of_executed_units:\s*(\d+)", said)
         if status:
             damage = b"".join(path.read_bytes() for path in folder.glob("*-*") if path.is_file())
             return 0, f"{kind}: {damage[:4000]!r}\n{said[-6000:]}"
         if keep:
-            (folder / "fewest").mkdir()
-            status, said = run(kind, folder, ["-merge=1", *limits, str(folder / "fewest"), str(folder / "inputs")])
-            if status:
-                return 0, f"{kind}: {said[-6000:]}"
-            pack(kind, folder / "fewest")
+            pack(kind, folder / "inputs")
         return int(tried[1]) if tried else 0, ""
 
 
 def main() -> int:
     if sys.argv[1:2] == ["--child"]:
-        fuzz(sys.argv[2], sys.argv[3:])
+        fuzz(sys.argv[2], Path(sys.argv[3]), sys.argv[4:])
     made = parser(__doc__)
     made.add_argument("--format", metavar="NAME", help="this kind of file only")
     made.add_argument(
