@@ -18,7 +18,8 @@ from toolchain.debuginfo.dwarf import DwarfWriter
 from toolchain.debuginfo.metadata import DebugMetadata
 from toolchain.debuginfo.scopes import FunctionInfo
 from toolchain.debuginfo.variables import LocationLists
-from toolchain.emit import atomic_sections, constructors, data, isr, used
+from toolchain.emit import annotations as attributes
+from toolchain.emit import atomic_sections, constructors, data, used
 from toolchain.emit import function as emit
 from toolchain.ir import cfg
 from toolchain.ir.model import BlockAddress, ConstAgg, ConstExpr, Function, Module, UnsupportedError, Value
@@ -127,10 +128,10 @@ def _legalize(c: FunctionContext) -> None:
 def _select(c: FunctionContext) -> None:
     c.machine = select.FunctionSelector(c.module, c.function, c.for_size, c.taken).run()
     c.machine.interrupt = c.interrupt
-    c.machine.naked = "naked" in c.function.attrs or isr.NAKED in c.notes
-    c.machine.preserved, c.machine.preprologue = isr.preserved(c.notes), isr.preprologue(c.notes)
+    c.machine.naked = "naked" in c.function.attrs or attributes.NAKED in c.notes
+    c.machine.preserved, c.machine.preprologue = attributes.preserved(c.notes), attributes.preprologue(c.notes)
     if c.interrupt:
-        c.machine.preserved += isr.accumulators(c.function)
+        c.machine.preserved += attributes.accumulators(c.function)
     c.machine.uses_fp = frame.wants_frame_pointer(c.machine, c.options.frame_pointer)
 
 
@@ -278,7 +279,7 @@ class ModuleCompiler:
     def __init__(self, module: Module, options: CompileOptions) -> None:
         self.module = module
         self.options = options
-        self.notes = isr.annotations_of(module)
+        self.notes = attributes.annotations_of(module)
         self.used = used.retained_names(module)
         module.large_data = options.large_data
         self.lines: list[str] = []
@@ -324,11 +325,11 @@ class ModuleCompiler:
     def _context(self, f: Function) -> FunctionContext:
         """Prepare a function for the passes. Raises UnsupportedError for a signature that it must not have."""
         notes = self.notes.get(f.name, set())
-        interrupt = isr.interrupt_kind(notes, self.declared(f.name))
-        probe = isr.wants_probe(notes, self.options.stack_check and not interrupt)
+        interrupt = attributes.interrupt_kind(notes, self.declared(f.name))
+        probe = attributes.wants_probe(notes, self.options.stack_check and not interrupt)
         if interrupt and (f.args or f.ret.kind != "void"):
             raise UnsupportedError("an interrupt function takes and returns nothing", self.declared(f.name))
-        if isr.NAKED in notes and isr.hides_operands(f):
+        if attributes.NAKED in notes and attributes.hides_operands(f):
             what = f"a result or parameter of the naked function {f.name} that only assembly uses"
             raise UnsupportedError(f"{what}: remove its C statements", self.declared(f.name))
         if not self.options.debug:
@@ -385,7 +386,7 @@ class ModuleCompiler:
         # sections `near` and `far` are ignored: -mlarge-code alone selects the form of calls
         own = "" if sections.attribute_section(f.section) else f.section
         section = own or (".isr.text." if interrupt else ".text.") + name
-        modifiers = isr.section_modifiers(self.notes.get(f.name, set()))
+        modifiers = attributes.section_modifiers(self.notes.get(f.name, set()))
         keep = used.KEEP if f.name in self.used else ""
         self.lines.append(f"\t.section {section},code{modifiers}{keep}")
         self.lines.append("\t.align 2")
@@ -395,7 +396,7 @@ class ModuleCompiler:
             self.lines.append(f"\t.global {name}")
         self.lines.append(f"\t.type {name},@function")
         self.lines.append(f"{name}:")
-        for vector in isr.vector_symbols(self.notes.get(f.name, set())):
+        for vector in attributes.vector_symbols(self.notes.get(f.name, set())):
             self.lines += [f"\t.global {vector}", f"{vector}:"]
 
     def aliases(self) -> None:

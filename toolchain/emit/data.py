@@ -8,7 +8,7 @@ from toolchain.abi.names import block_label, symbol
 from toolchain.abi.sections import SECTION_ATTRIBUTES, attribute_section, is_near
 from toolchain.abi.target import NEAR_END
 from toolchain.debuginfo.metadata import DebugMetadata
-from toolchain.emit.isr import address_and_reverse, section_modifiers
+from toolchain.emit.annotations import address_and_reverse, section_modifiers
 from toolchain.emit.used import KEEP
 from toolchain.ir.model import (
     BlockAddress,

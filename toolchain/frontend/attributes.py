@@ -2,8 +2,9 @@
 
 The pass finds every `__attribute__((...))` and `__attribute((...))` token by token, wherever the declaration has it,
 and replaces the attributes of `REWRITES`; the others are clang's. Attributes of definitions become annotations, which
-`emit/data.py` and `emit/isr.py` read with the values that clang computed for their arguments. Attributes that select a
-memory become section names, made unique by a number, because constants, variables and functions cannot share one.
+`emit/data.py` and `emit/annotations.py` read with the values that clang computed for their arguments. Attributes that
+select a memory become section names, made unique by a number, because constants, variables and functions cannot share
+one.
 """
 
 from __future__ import annotations

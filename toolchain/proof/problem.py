@@ -24,7 +24,7 @@ from toolchain.driver.driver import assembler_options, front_end, optimise
 from toolchain.driver.pipeline import ModuleCompiler
 from toolchain.elf.model import Home, ObjectFile, Symbol
 from toolchain.elf.write import executable_bytes
-from toolchain.emit.isr import annotations_of, interrupt_kind, preserved
+from toolchain.emit.annotations import annotations_of, interrupt_kind, preserved
 from toolchain.errors import ToolError
 from toolchain.frontend.options import parse
 from toolchain.ir.model import Module, size_of
