@@ -19,7 +19,7 @@ extern "C" {
 #endif
 
 typedef enum {
-    SYS_RESET_POWER, /* power-on; also where the CPU does not tell */
+    SYS_RESET_POWER, /* power-on, or a cause that the CPU does not report */
     SYS_RESET_BROWN_OUT,
     SYS_RESET_PIN,
     SYS_RESET_SOFTWARE,

@@ -54,7 +54,7 @@ static HAL_OUTLINE void ring_remove(const sys_pcb *p)
 }
 
 /* Returns the link of the blocked list that points to p. */
-/* Per woken thread, n * n / 4: those that stay in front of it. */
+/* All threads woken together take at most n * n / 4 steps: each passes those that stay blocked in front of it. */
 BOUNDS_AT("while (*link != p)", loop n, share event.c / wake_waiters n * n / 4);
 static HAL_OUTLINE sys_pcb **link_to(const sys_pcb *p)
 {

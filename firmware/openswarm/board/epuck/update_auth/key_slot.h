@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Address of the key: the row before the stores, eight words with two bytes each. `openswarm flash` finds it by the
- * symbol ___update_key. */
+/* Flash addresses of the key: the row before the program stores, of which eight words hold two bytes each.
+ * `openswarm flash` finds it by the symbol ___update_key. */
 #ifndef KEY_SLOT_H
 #define KEY_SLOT_H
 
