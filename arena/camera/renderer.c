@@ -23,7 +23,7 @@ struct disc {
     f64 cos, sin; // of a robot's heading, in the camera frame
 };
 
-// Position of a LED on a robot's edge: its direction from the centre (forward, left), and from which to which height.
+// Position of an LED on a robot's edge: direction from the centre (forward, left), lowest and highest point.
 struct led {
     f64 forward, left, low, high;
 };

@@ -73,7 +73,7 @@ def _declared(name: str, text: str) -> Experiment:
 
 
 def code_needed(name: str, what: str) -> SceneError:
-    """Return the error that `what` needs the code of the experiment called `name`."""
+    """Return the error for a request, `what`, that needs the code of the experiment called `name`."""
     return SceneError(f"experiment {name}: {what}: needs the experiment's code, which a record does not run: "
                       "name its file with --experiment FILE, or accept the recorded copy with --trust")  # fmt: skip
 

@@ -1,7 +1,8 @@
 """The ring of infrared sensors in the world: own reflections, room light, lamps and other robots' light (epuck.md §5).
 
-Nothing is computed before the firmware converts one of the eight channels, and then once per quantum, by light.c. Light
-of other robots arrives one quantum late, so the order in which the robots run has no effect.
+The computation starts when the firmware first converts one of the eight channels. From then on, light.c computes all
+channels once per quantum. Light of other robots arrives one quantum late, so the order in which the robots run has no
+effect.
 """
 
 from __future__ import annotations

@@ -301,7 +301,7 @@ void stop_workers(struct scheduler *s)
     wake_workers(s);
 }
 
-// Run every robot that is runnable or waits for poses that exist.
+// Run every robot that is runnable, or that waits for poses already computed.
 static void run_ready(struct scheduler *s)
 {
     i64 count = 0;

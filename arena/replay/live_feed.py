@@ -89,7 +89,7 @@ class Follower:
         self._finished: Trial | None = None
 
     def metadata(self) -> list[Trial]:
-        """Return the trial without samples; nothing if its metadata is not written yet."""
+        """Return the trial without its samples, or an empty list if its metadata is not written yet."""
         self._catch_up()
         return [Trial(self._path, {}, self._about)] if self._about else []
 

@@ -174,6 +174,6 @@ class CheckpointPool:
         self._checkpoints.remove(checkpoint)
 
     def discard_after(self, tick: int) -> None:
-        """End the checkpoints after `tick`."""
+        """End the processes of the checkpoints later than `tick`."""
         while self._checkpoints and self._checkpoints[-1].tick > tick:
             self._checkpoints.pop().pipe.close()
