@@ -136,7 +136,7 @@ class Machine(BareMachine):
         return run_to_place(self, self.inspector, self.program_address(until), when, limit)
 
     def _is_condition(self, text: str) -> bool:
-        """Whether `text` is no name: a C expression of several parts, and no symbol of the image."""
+        """Whether `text` is a C expression, which is neither a single name nor a symbol of the image."""
         known = self.image is not None and self.image.symbols.find(text) is not None
         return not known and re.fullmatch(r"[\w.$@]*", text) is None
 

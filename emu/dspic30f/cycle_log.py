@@ -1,6 +1,6 @@
 """Layout of the words after the cells of cycle accounting, for its writers (cycle_accounting.py and jit/counters).
 
-The module imports no package for arrays, which the translator does not need.
+The module does not import numpy, because the translator uses this layout without arrays.
 """
 
 from __future__ import annotations

@@ -110,7 +110,7 @@ class Observation:
             self._undo.append((owner, name))
 
     def stop(self) -> None:
-        """Stop to observe."""
+        """Stop observing the machine."""
         while self._undo:
             delattr(*self._undo.pop())
 
@@ -217,7 +217,7 @@ class HookObservation:
             self._undo.append(self._machine.hook_pc(address, partial(_call, callback)))
 
     def stop(self) -> None:
-        """Stop to observe."""
+        """Stop observing the machine."""
         while self._undo:
             self._undo.pop()()
 

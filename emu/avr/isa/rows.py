@@ -1,6 +1,6 @@
 """The instruction table of the ATmega328P (AVR instruction set manual; cycles of the core without EIND and RAMPZ).
 
-`docs/reference/avr.md` §2 names the sources, and README.md of this folder the names that a meaning may use.
+`docs/reference/avr.md` §2 lists the sources. README.md of this folder lists the names that a meaning may use.
 """
 
 from __future__ import annotations

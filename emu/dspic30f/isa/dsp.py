@@ -94,7 +94,7 @@ def shifted(m: Builder, v: Value, right: int) -> Value:
 
 
 def rounded_word(m: Builder, v: Value, rounding: bool) -> Value:
-    """Return the word that SAC, or SAC.R with ``rounding``, and write-back store for the 40-bit value v (§8.4)."""
+    """Return the word that SAC and write-back store for the 40-bit value v, or SAC.R if ``rounding`` (§8.4)."""
     if rounding and m.context.rnd:
         v = v + 0x8000
     elif rounding:  # convergent rounding: a tie goes to the even word

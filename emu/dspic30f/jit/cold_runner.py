@@ -1,4 +1,4 @@
-"""Runner for code without a native translation: the sequencer, up to a boundary with work or a limit."""
+"""Interpreter loop for code without native translation: runs to a limit, a due event or a hooked address."""
 
 from __future__ import annotations
 
