@@ -179,7 +179,7 @@ class CallExecution(InstructionExecution):
             self._arrive(last.after, state)
 
     def _leak(self, value: Value) -> int:
-        """Return the lowest stack address that a value shows to a callee, NO_ADDRESS for none."""
+        """Return the lowest stack address that a value exposes to a callee, NO_ADDRESS if it exposes none."""
         return extremes(value)[0] if self.area.points_into(value) else NO_ADDRESS
 
     def _after_general_call(self, before: AbstractState, end: AbstractState, found: FunctionResult) -> AbstractState:

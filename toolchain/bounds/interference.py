@@ -170,7 +170,7 @@ def _runs(interrupts: Iterable[Bound]) -> dict[str, int]:
 
 
 def _stacks(report: BoundsReport, analysis: BoundAnalysis) -> None:
-    """Compute the bytes of each entry, and of the second stack, under the deepest chain of nested interrupts."""
+    """Compute the stack bytes of each entry and of the second stack, with the deepest chain of nested interrupts."""
 
     def known(*parts: Bound) -> bool:
         return not report.contradictions and all(part.stack_is_known for part in parts)

@@ -59,7 +59,10 @@ class FunctionResult:
         self.shared_iterations[scope] = max(most[0], cycles), max(most[1], total)
 
     def excluded_cycles(self, entry: int | None) -> int:
-        """Return the cycles of the excluded iterations in scopes of a function, None for the whole analysis."""
+        """Return the cycles of the excluded iterations in scopes of a function.
+
+        `entry` is the function, or None for the whole analysis.
+        """
         return sum(cycles * total for (of, _), (cycles, total) in self.shared_iterations.items() if of == entry)
 
     def merge_call(self, other: FunctionResult, start: int, since: list[int | None], caller: tuple[int, ...]) -> None:
