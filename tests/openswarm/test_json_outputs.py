@@ -218,7 +218,7 @@ def test_emu_outputs_with_the_kernel(run: Callable[..., Any]) -> None:
 
 @pytest.mark.slow
 def test_toolchain_outputs(run: Callable[..., Any]) -> None:
-    """Sizes, symbols and bounds; a limit that does not hold is in the JSON object."""
+    """JSON output of size, nm and bounds; the JSON object lists an exceeded limit."""
     run("toolchain", "size {hello}")
     run("toolchain", "nm {hello}")
     bounds = run("toolchain", "bounds {fault} --limit main=1 --stack-limit main=100", status=1)

@@ -36,7 +36,7 @@ poses = [[200, 200, 0]]
 
 
 class Point(ControllerWithoutUart):
-    """Drives ahead at 2 cm/s, as fast as its number says."""
+    """Drives ahead at 2 cm/s times its number, counted from 1."""
 
     def __init__(self, robot: int) -> None:
         self._speed = 2.0 * (robot + 1)

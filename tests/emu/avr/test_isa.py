@@ -1,4 +1,4 @@
-"""The AVR instruction table: no word twice, text as binutils prints it, meaning as simavr computes it."""
+"""The AVR instruction table: each word has one row, text equals that of binutils, results equal those of simavr."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`emu profile --board kilobot`: exact cycles by function and line, and observed runs that equal others."""
+"""`emu profile --board kilobot`: exact cycles by function and line; observers do not change a run."""
 
 from __future__ import annotations
 

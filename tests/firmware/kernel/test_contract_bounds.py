@@ -198,7 +198,7 @@ def test_a_longer_memory_has_longer_paths(crowded: Path) -> None:
 def test_bounds_are_close_where_structures_are_at_their_worst(crowded: Path) -> None:
     """No measured call exceeds its bound when the kernel's structures have their worst shapes.
 
-    One round of the scenes is run, and their effects are checked.
+    The image runs every scene of tests/firmware/target/crowded once, and checks its effects.
     """
     _, seconds, values = IMAGES["crowded"]
     rows = {row.call: row for row in rows_of("crowded", crowded, values, seconds / 2)}

@@ -133,9 +133,10 @@ def test_interrupts_at_known_boundaries_agree(built: Path) -> None:
 
 @pytest.mark.slow
 def test_planted_faults_are_found(built: Path, tmp_path: Path) -> None:
-    """The program that found a fault in the campaign differs while the fault is planted, and only then.
+    """For each planted fault, kernel and model differ on the recorded program; without the fault they agree.
 
-    Every fourth fault is planted; the commit determines which.
+    The campaign recorded the first program that found each fault. Every fourth fault is planted; the commit determines
+    which.
     """
     assert FOUND_BY.keys() == {fault.name for fault in FAULTS}
     programs = {name: Program.parse(text) for name, text in FOUND_BY.items()}

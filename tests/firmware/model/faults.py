@@ -149,7 +149,7 @@ def plant(fault: Fault, built: Path, folder: Path) -> Path:
 
 
 def programs_until_found(interpreter: Path, seed: int, most: int, remote: bool = False) -> tuple[int, Program] | None:
-    """Return the number of the first program that differs, counted from 1, and the program; None: `most` agree."""
+    """Return the number of the first program that differs, counted from 1, and the program; None if `most` agree."""
     kernels = Kernels(interpreter)
     for tried in range(0, most, BATCH):
         programs = random_programs(seed + tried, BATCH, remote)

@@ -60,9 +60,9 @@ def test_offsets_count_file_octets(asm):
     ],
 )  # fmt: skip
 def test_the_addend_stands_in_the_field(asm, line, word):
-    """The addend is stored in the field: branches in PC units, MOV f in words, bits above 7 in the next byte.
+    """The addend is stored in the field (abi-elf.md §5).
 
-    Source: abi-elf.md §5.
+    Branches store it in PC units, MOV f in words. A bit number above 7 selects a bit of the next byte.
     """
     assert asm(line + "\n").words() == [word]
 

@@ -67,7 +67,7 @@ WRITES = {
 
 @pytest.mark.parametrize("syntax", WRITES)
 def test_a_result_keeps_all_values_for_which_the_condition_of_its_flags_holds(syntax: str) -> None:
-    """The register of a result keeps each value after which the branch is taken, for all intervals of the source."""
+    """For every interval of the source, the result's abstract value keeps each value for which the branch is taken."""
     row = next(row for row in ROWS if row.syntax == syntax)
     insn = decode_for_execution(*encode(row, {"w": 1, "s": 1, "d": 2, "k": 5}))
     assert insn is not None

@@ -67,10 +67,10 @@ def program_of(path: Path) -> Program:
 
 @pytest.mark.slow
 def test_no_stack_of_an_application_exceeds_its_bound(image: Build, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Every stack of listing1 has a bound that covers what is measured; its thread alone needs exactly the bound.
+    """No measured stack of listing1 exceeds its bound, and the stack of its thread alone equals the bound.
 
-    The thread's deepest call is snprintf, whose assembly shares W9 between its routines. An analysis that assumes all
-    routines to preserve W8-W14 states less than the measurement.
+    The thread's deepest call is snprintf, whose assembly shares W9 between its routines. An analysis that assumes
+    that all routines preserve W8-W14 gives a bound below the measurement.
     """
     path = image("listing1")
     seen = Observer(path, program_of(path)).run(CYCLES)

@@ -145,7 +145,7 @@ def test_collection_keeps_what_the_roots_reach(image):
 
 
 def test_collection_keeps_sections_whose_limits_are_asked_for(image):
-    """--gc-sections keeps a section whose limits are used, as by `.startof.(x)`."""
+    """--gc-sections keeps a section whose start or size an operator reads, such as `.startof.(x)`."""
     text = (
         ".global __reset\n__reset: mov #.startof.(mine), w0\n .section mine,bss,near\nkept: .space 4\n"
         " .section not,bss\nx: .space 2\n"

@@ -252,7 +252,7 @@ def test_memory_of_a_refutation_is_in_the_image(tmp_path: Path) -> None:
 def test_nothing_of_the_kernel_is_refuted() -> None:
     """No kernel function is refuted, and functions without loops are proved.
 
-    A sample of tests/fuzz/compiler/fuzz_prove.py.
+    The test runs a sample of the campaign in tests/fuzz/compiler/fuzz_prove.py.
     """
     for file in ("error.c", "init.c", KERNEL_FILES[base_seed() % len(KERNEL_FILES)]):
         found = prove_kernel(file, 8, random.Random(base_seed()))

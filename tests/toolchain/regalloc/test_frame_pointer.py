@@ -1,6 +1,6 @@
 """-fno-omit-frame-pointer, the default at -O0: LNK, ULNK and W14 in every function, as XC16 frames them.
 
-Operating systems of XC16's time build their context switch on it: ULNK removes what inline assembly left on the stack.
+Context switches of operating systems written for XC16 rely on it: ULNK removes what inline assembly left on the stack.
 """
 
 from __future__ import annotations

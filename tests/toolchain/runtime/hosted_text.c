@@ -7,7 +7,7 @@
 #include <string.h>
 
 static uint32_t state = 7216;
-static unsigned below(unsigned n) /* returns the upper half of a linear congruential generator's state */
+static unsigned below(unsigned n) /* a pseudo-random number below n, from a linear congruential generator */
 {
     state = state * 1664525u + 1013904223u;
     return (unsigned)(state >> 16) % n;

@@ -5,7 +5,7 @@
 volatile uint16 port_sizes[SIZES]; /* for the test */
 volatile uint8 program[600];
 static uint8 skipped_allocations, failing_allocations;
-static uint8 unlocks_left; /* until isr_at_unlock; 0: none is wanted */
+static uint8 unlocks_left; /* calls of hal_unlock() until isr_at_unlock runs; 0: it does not run */
 static void (*isr_at_unlock)(void);
 
 void machine_init(void);
