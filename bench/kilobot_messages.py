@@ -1,10 +1,10 @@
-"""Messages of 25 emulated Kilobots beside those of 25 real ones: sent, and received by distance (kilobot.md §5).
+"""Compare messages of 25 emulated and 25 real Kilobots: numbers sent, and shares received by distance (kilobot.md §5).
 
     python bench/kilobot_messages.py [--image FILE.elf] [--seeds 1] [--seconds 161] [--json]
 
-Robots on a grid of 50 mm send as often as they may for 4,800 ticks (firmware/kilobot/programs/counts.c). An image of
-that program with another library may be named. Two things are fitted: the share of lost pulses by distance, and the
-spread of the clocks. What the robots send and how frames collide follows from the firmware.
+Robots on a grid of 50 mm send at the maximum rate for 4,800 ticks (firmware/kilobot/programs/counts.c). `--image`
+selects the same program linked with another library. Two parameters are fitted: the share of lost pulses by distance,
+and the spread of the clocks. The firmware determines what the robots send and when frames collide.
 """
 
 from __future__ import annotations

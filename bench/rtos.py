@@ -155,7 +155,7 @@ def frames(image: Image) -> dict[str, int]:
 
 
 def on_port(robot: str) -> dict[str, Any]:
-    """Return the cells of a simulated robot. Raises NotInstalled."""
+    """Return the table cells of a simulated robot. Raises NotInstalled if its tools are missing."""
     found = measure(robot)
     cycles, equation, sizes = found["cycles"], found["equation"], found["sizes"]
     return {

@@ -85,7 +85,10 @@ class _Moment:
 
 
 def _worst(moments: Mapping[tuple[str, int], _Moment]) -> list[_Moment]:
-    """Return the moments whose stack was never as deep at the same or a lower priority, where more may interrupt."""
+    """Return the moments whose stack is deeper than at any lower priority.
+
+    At a lower priority more interrupts can nest, so the other moments cannot lead to a greater total.
+    """
     found = []
     for (name, priority), moment in moments.items():
         others = [other for (stack, at), other in moments.items() if stack == name and at < priority]

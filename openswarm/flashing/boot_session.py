@@ -89,7 +89,7 @@ class BootSession:
                 raise RobotError(f"no boot loader answered within {seconds:g} s{also}: press the robot's reset button")
 
     def _receive(self, seconds: float) -> bytes:
-        """Return the bytes received within a time; return earlier after a known loader type and 'K'."""
+        """Return the bytes received within `seconds`; a known loader type followed by 'K' ends the wait early."""
         heard = b""
         limit = self._line.now() + seconds
         while (left := limit - self._line.now()) > 0:
