@@ -62,7 +62,7 @@ def wait_for_port(port: int) -> None:
         ["--robots", "-1"], ["--objects", "x"],
     ],
 )  # fmt: skip
-def test_numbers_that_are_none(words: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_invalid_numbers_are_refused(words: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """An invalid number is named and ends with status 2; no folder is created."""
     assert main([*SHORT, *words, "--out", str(tmp_path / "out")]) == 2
     output = capsys.readouterr().err

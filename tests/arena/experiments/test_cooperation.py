@@ -90,7 +90,7 @@ def test_three_clocks_come_together(tmp_path: Path) -> None:
     assert made.series.last("apart") < 50
 
 
-def test_a_leader_is_one_who_lives() -> None:
+def test_only_a_robot_that_is_on_and_ranked_is_a_leader() -> None:
     """Followers of a robot that is switched off or has an unknown rank do not count; the last reported rank is used."""
     lines = [UartLine(robot, 0.2, f"rank {10 - robot}") for robot in range(5)]
     lines += [UartLine(robot, 0.4, "leader 10") for robot in range(5)]

@@ -59,7 +59,7 @@ def test_offsets_count_file_octets(asm):
         ("mov #psvoffset(sym)+3, w0", 0x200030), ("mov #psvoffset(sym+3), w0", 0x200030),
     ],
 )  # fmt: skip
-def test_the_addend_stands_in_the_field(asm, line, word):
+def test_the_field_contains_the_addend(asm, line, word):
     """The addend is stored in the field (abi-elf.md §5).
 
     Branches store it in PC units, MOV f in words. A bit number above 7 selects a bit of the next byte.

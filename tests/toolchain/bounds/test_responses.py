@@ -123,7 +123,7 @@ def test_no_response_and_no_stack_is_above_its_bound(tmp_path: Path, name: str) 
     assert high.cycles <= 1.3 * seen.handlers["T1Interrupt"].late + 50
 
 
-def test_what_holds_interrupts_back_for_ever_leaves_no_response(tmp_path: Path, capsys) -> None:
+def test_code_that_masks_interrupts_for_ever_has_no_response_bound(tmp_path: Path, capsys) -> None:
     """An endless loop entered at IPL 4 leaves lower interrupts without a response bound; the command names the loop."""
     image = images(tmp_path, "bset 0x42,#7\n" + LOOP + T1 + T2, (4, 5), (4, 5))
     report = analyse(image)

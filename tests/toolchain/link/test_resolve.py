@@ -144,7 +144,7 @@ def test_collection_keeps_what_the_roots_reach(image):
     assert "gone" in image(text).symbols
 
 
-def test_collection_keeps_sections_whose_limits_are_asked_for(image):
+def test_collection_keeps_sections_whose_start_or_size_is_read(image):
     """--gc-sections keeps a section whose start or size an operator reads, such as `.startof.(x)`."""
     text = (
         ".global __reset\n__reset: mov #.startof.(mine), w0\n .section mine,bss,near\nkept: .space 4\n"

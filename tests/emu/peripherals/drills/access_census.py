@@ -8,7 +8,7 @@ from typing import Final
 from emu.dspic30f.state.state import DA, NOT_REPEATING, RA
 from emu.machine.machine import Machine
 
-WAYS: Final = ("address", "pointer", "REPEAT", "DO", "handler", "event")
+ACCESS_MODES: Final = ("address", "pointer", "REPEAT", "DO", "handler", "event")
 """Names of access modes. Bit n of a key's last part stands for mode n: by address, by pointer, under REPEAT, in DO,
 in an interrupt handler, in the cycle in which an event is due."""
 
@@ -65,7 +65,7 @@ def modes_of(accesses: Counter[tuple[str, int, bool, int, int]]) -> Counter[tupl
     modes."""
     found: Counter[tuple[str, int, bool, int, str]] = Counter()
     for (chip, ea, is_write, size, modes), count in accesses.items():
-        for bit, name in enumerate(WAYS):
+        for bit, name in enumerate(ACCESS_MODES):
             if modes >> bit & 1:
                 found[chip, ea, is_write, size, name] += count
     return found

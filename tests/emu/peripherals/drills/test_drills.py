@@ -9,7 +9,7 @@ import pytest
 
 from emu.machine.machine import Machine
 
-from .access_census import WAYS, modes_of
+from .access_census import ACCESS_MODES, modes_of
 from .device_drills import registers_of
 from .device_programs import CHIPS
 from .drill_runs import Tally, check, crew_of
@@ -38,9 +38,9 @@ def test_a_sample_of_drills_reaches_most_registers() -> None:
     for seed in range(100, 116):
         assert check(seed, CHIPS[REAL], tally, engines=("plain",), rounds=8) is None
     made, registers = modes_of(tally.accesses), registers_of(REAL)
-    for way, size, write in product(WAYS, (1, 2), (False, True)):
-        missed = [sfr.name for sfr in registers if not made[REAL, sfr.address, write, size, way]]
-        assert 1 - len(missed) / len(registers) >= FLOORS[way], (way, size, write, missed)
+    for mode, size, write in product(ACCESS_MODES, (1, 2), (False, True)):
+        missed = [sfr.name for sfr in registers if not made[REAL, sfr.address, write, size, mode]]
+        assert 1 - len(missed) / len(registers) >= FLOORS[mode], (mode, size, write, missed)
 
 
 def late(machine: Machine) -> None:
