@@ -33,7 +33,7 @@ class Structures:
         call during a change."""
         try:
             return self._found()
-        except _Torn:
+        except _InconsistentError:
             return {}
 
     def _found(self) -> dict[str, int]:
@@ -62,7 +62,7 @@ class Structures:
         try:
             return self.machine.peek(address)
         except ValueError:  # not a valid address
-            raise _Torn from None
+            raise _InconsistentError from None
 
     def _list(self, link: int, step: int) -> Iterator[int]:
         """Yield the addresses of a list's members.
@@ -75,7 +75,7 @@ class Structures:
                 return
             yield member
             link = member + step
-        raise _Torn
+        raise _InconsistentError
 
     def _ring(self, first: int) -> set[int]:
         """Return the addresses of the threads in a ring, such as that of the ready threads."""
@@ -90,9 +90,9 @@ class Structures:
             return 0
         size = self._word(hole + HOLE_SIZE)
         if size < HOLE_SIZE + 2 or self._word(hole + size - HEAP_STEP) != size:  # a hole repeats its size at its end
-            raise _Torn
+            raise _InconsistentError
         return 1 + max(self._depth(self._word(hole + side)) for side in SIDES)
 
 
-class _Torn(Exception):
+class _InconsistentError(Exception):
     """A structure is being changed, so its links are inconsistent."""
