@@ -25,6 +25,9 @@ class BoardPart:
         self.events: Final[Events] = chip.context.bus.events
         self.pins: Final[Pins] = chip.pins
 
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__} of a {self.chip.context.chip.name}>"
+
     @property
     def now(self) -> int:
         """Cycle (Tcy) of the access or event that is being handled."""

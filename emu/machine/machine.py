@@ -11,6 +11,7 @@ import math
 from collections.abc import Callable
 from fractions import Fraction
 from numbers import Real
+from pathlib import Path
 from typing import Any, Final, Protocol
 
 from emu.chips.chip import Chip, Vector
@@ -127,6 +128,10 @@ class Machine(StateAccess):
         self.memory_observer = observer(self) if observer is not None else None
         self.runner = make_engine(engine, self.core, self._pc_hooks.by_address, self._pc_hooks.filters)
         self.reset("POR")
+
+    def __repr__(self) -> str:
+        name = f"{self.chip.name}: {Path(self.image.path).name[-60:]}" if self.image is not None else self.chip.name
+        return f"<Machine {name}, at {self.pc:#08x}, cycle {self.cycle:,}, {self.seconds:.6f} s>"
 
     @property
     def engine(self) -> str:

@@ -42,3 +42,6 @@ class EpuckHardware:
         self.camera: Final = Camera(chip, camera) if camera is not None else None
         if self.camera is not None:
             chip.on_restored.append(self.camera.restored)
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__} with {self.selector!r}, {self.leds!r}>"

@@ -46,6 +46,9 @@ class Leds(BoardPart):
         """Names of the LEDs that are on."""
         return tuple(name for name in LED_PINS if self[name])
 
+    def __repr__(self) -> str:
+        return f"<Leds, lit: {', '.join(self.lit) or 'none'}>"
+
     def states(self) -> list[bool]:
         """Return whether each LED is lit: ring LEDs 0-7, front, body."""
         level = self.pins.level
@@ -71,6 +74,9 @@ class Selector(BoardPart):
             raise ValueError(f"the selector has positions 0 to 15, not {position}")
         port, _ = parse_pin("RG6")
         self.pins.set_port(port, 0xF << 6, position << 6)
+
+    def __repr__(self) -> str:
+        return f"<Selector at {self.position}>"
 
 
 class Battery(BoardPart):

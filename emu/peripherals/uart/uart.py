@@ -220,6 +220,9 @@ class Uart(Peripheral):
         """Bit time in Tcy: 16 (BRG + 1)."""
         return int(bit_time(self.bus.integers, self._operands))
 
+    def __repr__(self) -> str:
+        return f"<Uart {self.site.number}, {'enabled' if self.is_enabled else 'disabled'}>"
+
     @property
     def is_enabled(self) -> bool:
         """Whether UARTEN is set."""

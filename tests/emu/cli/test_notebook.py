@@ -8,6 +8,7 @@ import sys
 import pytest
 
 import emu
+from emu.boards.part import BoardPart
 from emu.host.result_tables import data_frame, html_table
 from emu.kernel_metrics.cycle_results import ApplicationCycles, Operation
 from emu.profile.cycle_shares import Profiler
@@ -45,6 +46,15 @@ def test_the_text_of_every_public_object_is_short(machine):
         Operation("x" * 500, list(range(500))), ApplicationCycles(1.0, {}),
     ]  # fmt: skip
     assert [repr(one)[:300] for one in objects if len(repr(one)) > LONGEST] == []
+
+
+def test_the_text_of_a_machine_and_its_parts_says_their_state(machine):
+    assert re.fullmatch(r"<Machine dsPIC30F6014A: main\.elf, at 0x\w+, cycle [\d,]+, [\d.]+ s>", repr(machine))
+    assert repr(machine.uart[1]) == "<Uart 1, disabled>"
+    assert repr(machine.board) == "<Epuck with <Selector at 0>, <Leds, lit: none>>"
+    parts = [part for part in vars(machine.board).values() if isinstance(part, BoardPart)]
+    assert len(parts) > 8
+    assert [repr(part) for part in parts if " object at 0x" in repr(part)] == []
 
 
 def test_results_are_tables(machine):
