@@ -1,7 +1,7 @@
 """Regions that have run so long that compiling them again, with all of LLVM's passes, pays.
 
 Native code is not instrumented for this. Where a native run ends is a sample: its length counts for the region of that
-address. The first code of a region comes from a short list of passes (`worker.py`).
+address, unless the CPU sleeps there. The first code of a region comes from a short list of passes (`worker.py`).
 """
 
 from __future__ import annotations
