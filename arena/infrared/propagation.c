@@ -8,12 +8,14 @@ typedef double f64;
 
 extern f64 atan2(f64, f64);
 extern f64 cos(f64);
+extern f64 exp(f64);
 extern f64 fabs(f64);
 extern f64 pow(f64, f64);
 extern f64 sin(f64);
 extern f64 sqrt(f64);
 
 enum { SENSORS = 8, LINES = 4 };
+enum { POINTS = 11, SIDE_RAYS = 7 }; // of the response (ring.c); most rays on either side of a sensor's axis
 static const f64 PI = 3.14159265358979323846;
 
 struct disc {
@@ -44,6 +46,8 @@ struct optics {
     i64 side_count;
     const struct polygon *polygons; // in the order of their headings in the poses; out of reach: no corners
     i64 polygon_count;
+    i64 side_rays; // of a sensor's beam, whose half-angle is `half_beam`
+    f64 half_beam, near[POINTS], counts[POINTS], slope[POINTS];
 };
 
 // Poses of all bodies: x, y, heading of the robots, then x, y of the objects, then headings of the polygons.
@@ -168,12 +172,12 @@ static f64 wall_distance(f64 at, f64 direction, f64 size)
     return ((direction > 0 ? size : 0) - at) / direction;
 }
 
-// Compute what the axis of a sensor hits: cm from the robot's edge, and reflection as a share of white paper's; infinity
-// and 0 out of range.
-static void surface(const struct optics *o, const struct poses *p, i64 own, i64 sensor, f64 *found)
+// Compute what a ray hits: cm from the robot's edge, and reflection as a share of white paper's; infinity and 0 out of
+// range.
+static void cast(const struct optics *o, const struct poses *p, i64 own, f64 angle, f64 *found)
 {
     const f64 *here = p->values + 3 * own;
-    f64 x = here[0], y = here[1], angle = here[2] - o->bearings[sensor], east = cos(angle), north = sin(angle);
+    f64 x = here[0], y = here[1], east = cos(angle), north = sin(angle);
     f64 to_x = wall_distance(x, east, o->width), to_y = wall_distance(y, north, o->height);
     struct ray ray = {x, y, east, north, to_x < to_y ? to_x : to_y, 0};
     ray.share = o->wall_share * fabs(to_x < to_y ? east : north);
@@ -193,6 +197,41 @@ static void surface(const struct optics *o, const struct poses *p, i64 own, i64 
     f64 radius = o->robots[own].radius, gap = distance - radius > 0 ? distance - radius : 0;
     found[0] = gap <= o->range ? gap : __builtin_inf();
     found[1] = gap <= o->range ? share : 0;
+}
+
+// Reflection of a white surface in counts, as `reflection_at` of analog.py.
+static f64 response(const struct optics *o, f64 millimetres)
+{
+    i64 after = 0;
+    while (after < POINTS && o->near[after] < millimetres)
+        after++;
+    if (after == POINTS)
+        return 0;
+    return after ? o->counts[after - 1] * exp(o->slope[after - 1] * (millimetres - o->near[after - 1])) : o->counts[0];
+}
+
+// Compute the surface that a sensor faces, as `cast`. Several rays become one surface at the nearest distance, with the
+// share by which the rays reflect what they would reflect from a white wall across the axis at this distance.
+static void surface(const struct optics *o, const struct poses *p, i64 own, i64 sensor, f64 *found)
+{
+    f64 axis = p->values[3 * own + 2] - o->bearings[sensor], nearest = __builtin_inf(), sum = 0, white = 0;
+    f64 rays[2 * SIDE_RAYS + 1][2], radius = o->robots[own].radius;
+    i64 sides = o->side_rays;
+    if (!sides) {
+        cast(o, p, own, axis, found);
+        return;
+    }
+    for (i64 i = -sides; i <= sides; i++) {
+        f64 *ray = rays[i + sides];
+        cast(o, p, own, axis + o->half_beam * (f64)i / (f64)sides, ray);
+        nearest = ray[0] < nearest ? ray[0] : nearest;
+    }
+    for (i64 i = -sides; i <= sides && nearest < __builtin_inf(); i++) {
+        f64 facing = cos(o->half_beam * (f64)i / (f64)sides);
+        white += facing * response(o, 10 * (i ? (radius + nearest) / facing - radius : nearest));
+        sum += rays[i + sides][1] * response(o, 10 * rays[i + sides][0]);
+    }
+    found[0] = nearest, found[1] = white > 0 ? sum < white ? sum / white : 1 : 0;
 }
 
 // Compute `surface` for all sensors in turn.

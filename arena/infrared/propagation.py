@@ -21,7 +21,7 @@ from arena.scene import dimensions, geometry
 from arena.scene.loader import Scene
 from arena.scene.robot_kind import EPUCK
 from arena.world.poses import Poses
-from emu.boards.epuck.analog import PULSE_PINS, SENSORS
+from emu.boards.epuck.analog import PULSE_PINS, RESPONSE, SENSORS, SLOPES
 from emu.native_library import ADDRESS, INT, address_of, functions
 
 PUBLISHED: Final = (
@@ -44,10 +44,11 @@ _BEARINGS: Final = tuple(math.radians(bearing) for bearing in dimensions.IR_BEAR
 
 
 class Surface(NamedTuple):
-    """The surface that a sensor's axis hits.
+    """The surface that a sensor faces.
 
-    `millimetres` is the distance from the robot's edge, inf beyond `dimensions.IR_RANGE`. `share` is the reflection as
-    a share of a white perpendicular surface's; at an angle it falls with the cosine (Lambert, UNVERIFIED).
+    `millimetres` is the distance from the robot's edge, inf beyond `dimensions.IR_RANGE`; of several rays
+    (`infrared.side_rays`) the least one. `share` is the reflection as a share of a white perpendicular surface's; at an
+    angle it falls with the cosine (Lambert, UNVERIFIED).
     """
 
     millimetres: float
@@ -116,7 +117,8 @@ class _Optics(Structure):
                                         "wall_share", "range")),
         ("bearings", c_double * SENSORS), ("robots", POINTER(_Disc)), ("objects", POINTER(_Disc)),
         ("fixed", POINTER(_Disc)), ("fixed_count", c_int64), ("sides", POINTER(_Side)), ("side_count", c_int64),
-        ("polygons", POINTER(_Polygon)), ("polygon_count", c_int64),
+        ("polygons", POINTER(_Polygon)), ("polygon_count", c_int64), ("side_rays", c_int64), ("half_beam", c_double),
+        *((name, c_double * len(RESPONSE)) for name in ("near", "counts", "slope")),
     ]  # fmt: skip
 
 
@@ -167,6 +169,7 @@ class Optics:
             *scene.arena.extent, setting.wall_share, dimensions.IR_RANGE,
             (c_double * SENSORS)(*_BEARINGS), self._robots, self._objects,
             self._fixed, len(fixed), self._sides, len(sides), self._polygons, len(shaped),
+            setting.side_rays, math.radians(dimensions.IR_HALF_BEAM_DEG), *zip(*RESPONSE, strict=True), SLOPES,
         )  # fmt: skip
         self._at = addressof(self._optics)
         self._poses = _Poses()
@@ -213,7 +216,7 @@ class Optics:
         return found
 
     def surfaces(self, poses: Poses, robot: int) -> list[Surface]:
-        """Return the surface that the axis of each sensor hits: wall, obstacle, object or robot."""
+        """Return the surface that each sensor faces: wall, obstacle, object or robot."""
         self.set_poses(poses)
         self._surfaces(self._at, self._poses_at, robot, self._found_at)
         found = iter(self._found)

@@ -61,6 +61,8 @@ LED_COS: Final = math.cos(0.5 / ROBOT_RADIUS)
 
 IR_BEARINGS_DEG: Final = (18.0, 45.0, 90.0, 142.0, 218.0, 270.0, 315.0, 342.0)
 """Bearings of the sensors, clockwise from the front; each one faces radially outwards from the edge (epuck.md §5)."""
+IR_HALF_BEAM_DEG: Final = 15.0
+"""Half-angle of the beam of an infrared sensor in degrees (epuck.md §5)."""
 IR_HEIGHT: Final = 2.5
 """Height of the infrared ring (epuck.md §9: that of the Enki model)."""
 IR_RANGE: Final = 10.0

@@ -67,6 +67,7 @@ LIMITS: Final[Mapping[type[Any], Mapping[str, tuple[float, float]]]] = {
         "signal_gain": (0, 100),
         "emitter_power": (0, 1000),
         "receiver_power": (0, 1000),
+        "side_rays": (0, 7),
         "tau_us": (1, 1000),
         "noise_counts": (0, 1000),
         "ripple_counts": (0, 1000),

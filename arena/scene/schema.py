@@ -112,6 +112,10 @@ class InfraredSetting:
     The `_share` values of surfaces are reflections as a share of white paper's; black is 0.1 to 0.3. UNVERIFIED except
     for white walls.
 
+    A proximity sensor casts a ray along its axis, and `side_rays` on either side of it, up to the half-angle of its
+    beam, 15 degrees (epuck.md §5). UNVERIFIED: all rays count alike. They are scaled so that a white wall across the
+    axis gives the published response at any distance.
+
     Light between robots (infrared/propagation.py) is `signal_gain` times the published amplitude. It falls with the
     angle to the axes of emitter and receiver as powers of the cosine: 20 and 3.3 halve it at 15 and 36 degrees.
     Receivers are low-passes with the time constant `tau_us`.
@@ -130,6 +134,7 @@ class InfraredSetting:
     signal_gain: float = 1.0
     emitter_power: float = 20.0
     receiver_power: float = 3.3
+    side_rays: int = 0
     tau_us: float = 60.0
     noise_counts: float = 0.0
     ripple_counts: float = 0.0

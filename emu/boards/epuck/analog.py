@@ -44,7 +44,7 @@ RESPONSE: Final = (  # distance in mm, reflection in counts: OpenSwarm's table (
 
 
 _NEAR: Final = tuple(distance for distance, _ in RESPONSE)
-_SLOPE: Final = tuple(math.log(low / high) / (far - near) for (near, high), (far, low) in pairwise(RESPONSE))
+SLOPES: Final = tuple(math.log(low / high) / (far - near) for (near, high), (far, low) in pairwise(RESPONSE))
 """Slope of the logarithm of the reflection per mm, after each point of the table."""
 
 
@@ -55,7 +55,7 @@ def reflection_at(distance_mm: float) -> float:
     if not distance_mm <= _NEAR[-1]:
         return 0.0
     index = bisect_left(_NEAR, distance_mm) - 1
-    return RESPONSE[index][1] * math.exp(_SLOPE[index] * (distance_mm - _NEAR[index]))
+    return RESPONSE[index][1] * math.exp(SLOPES[index] * (distance_mm - _NEAR[index]))
 
 
 class _Ring(Structure):
@@ -116,7 +116,7 @@ class Infrared(BoardPart):
         decayed = _DECAYED * self._tau_seconds * _FASTEST_HZ
         self._ring: Final = _Ring(*places, *lines, decayed, NOISE_COUNTS, NOISE_SHARE)
         self._ring.near[:], self._ring.counts[:] = zip(*RESPONSE, strict=True)
-        self._ring.slope[: len(_SLOPE)] = _SLOPE
+        self._ring.slope[: len(SLOPES)] = SLOPES
         self._ring_at: Final = addressof(self._ring)
         self._update_tau()
         chip.oscillator.on_change.append(self._update_tau)

@@ -209,7 +209,8 @@ def test_rare_conversions_read_the_present_surfaces(
     """Robots that drive and read a sensor only every 24 quanta see what is near at that time. Between two readings
     native code begins the quanta."""
     scene = load_scene("clustering").with_values(
-        robots__count=2, objects__count=0, start__spread_tcy=1, start__robot_poses=[[5.0, 150, 17], [10.0, 150, 40]],
+        robots__count=2, objects__count=0, infrared__side_rays=1, start__spread_tcy=1,
+        start__robot_poses=[[5.0, 150, 17], [12.0, 150, 40]],
     )  # fmt: skip
     image = assembled(SELDOM)
     expected, in_python = run(scene, image, "stepwise", monkeypatch)

@@ -16,6 +16,7 @@ from arena.scene.loader import Scene, load_scene
 from arena.scene.schema import ObjectKind, Obstacle
 from arena.world.physics import World
 from arena.world.poses import Poses
+from emu.boards.epuck.analog import reflection_at
 
 UP = math.pi / 2
 
@@ -179,6 +180,58 @@ def plain_surfaces(scene: Scene, poses: Poses, robot: int) -> list[tuple[float, 
         gap = max(distance - dimensions.ROBOT_RADIUS, 0.0)
         found.append((10 * gap, share) if gap <= dimensions.IR_RANGE else (math.inf, 0.0))
     return found
+
+
+def beam_surfaces(scene: Scene, poses: Poses, robot: int, rays: int) -> list[tuple[float, float]]:
+    """Return the surface that each sensor faces with `rays` rays within 15 degrees of its axis, by a reference
+    calculation: the nearest distance in mm, and the share of the reflections of a white wall at this distance."""
+    turns = [math.radians(15) * (2 * ray / (rays - 1) - 1) for ray in range(rays)]
+    robots, (x, y, heading) = list(poses.robots), poses.robots[robot]
+    by_turn = []
+    for turn in turns:
+        robots[robot] = x, y, heading + turn
+        by_turn.append(plain_surfaces(scene, Poses(robots, poses.objects), robot))
+    found = []
+    for rows in zip(*by_turn, strict=True):
+        nearest, radius = min(distance for distance, _ in rows), 10 * dimensions.ROBOT_RADIUS
+        if math.isinf(nearest):
+            found.append((math.inf, 0.0))
+            continue
+        white = sum(math.cos(turn) * reflection_at((radius + nearest) / math.cos(turn) - radius) for turn in turns)
+        found.append((nearest, min(sum(share * reflection_at(distance) for distance, share in rows) / white, 1.0)))
+    return found
+
+
+def test_beams_of_several_rays_equal_the_reference() -> None:
+    """With five rays per sensor, native propagation gives the surfaces of the reference."""
+    scene = load_scene("avoidance").with_values(infrared__wall_share=0.7)
+    beams, partly = Optics(scene.with_values(infrared__side_rays=2)), 0
+    for seed in range(40):
+        poses = World(scene, seed).poses
+        for robot in range(4):
+            for one, other in zip(beam_surfaces(scene, poses, robot, 5), beams.surfaces(poses, robot), strict=True):
+                assert other == pytest.approx(one, rel=1e-7, abs=1e-7)
+                partly += 0 < one[1] < 0.1
+    assert partly > 10
+
+
+@pytest.mark.parametrize("distance", [0.0, 4.0, 20.0, 55.0, 96.0])
+def test_a_wall_across_the_axis_gives_the_published_response(distance: float) -> None:
+    """With several rays a white wall across the axis has the distance and the reflection that a single ray has."""
+    scene = load_scene("clustering").with_values(robots__count=1, objects__count=0, infrared__side_rays=3)
+    poses = Poses([(dimensions.ROBOT_RADIUS + distance / 10, 150.0, math.pi / 2)], [])
+    assert Optics(scene).surfaces(poses, 0)[5] == pytest.approx((distance, 1.0), abs=1e-9)
+
+
+def test_a_beam_sees_a_post_beside_the_axis() -> None:
+    """A thin object 12 degrees beside the axis reflects into one of three rays, and not into a single one."""
+    scene = load_scene("clustering").with_values(robots__count=1, objects__count=1, objects__radius_cm=0.5)
+    at = math.radians(90 + 14)
+    poses = Poses([(200.0, 150.0, 0.0)], [(200 + 7 * math.cos(at), 150 + 7 * math.sin(at))])
+    one, three = (Optics(scene.with_values(infrared__side_rays=sides)).surfaces(poses, 0)[5] for sides in (0, 1))
+    assert one == (math.inf, 0.0)
+    assert 26 < three.millimetres < 30
+    assert 0.1 < three.share < 0.4
 
 
 @pytest.mark.parametrize("walls", [True, False])
