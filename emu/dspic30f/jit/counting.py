@@ -25,6 +25,7 @@ from emu.dspic30f.jit.counters.cycle_counters import (
 )
 from emu.dspic30f.jit.counters.execution_counter import ExecutionCounter
 from emu.dspic30f.jit.counters.instruction_counter import InstructionBoundaryCounter, InstructionCounter
+from emu.dspic30f.jit.exit_reasons import UNFINISHED
 from emu.dspic30f.jit.translate.region import Region
 
 
@@ -47,8 +48,8 @@ class Counting(Protocol):
     def before_run(self) -> None:
         """Prepare for a run of native code."""
 
-    def after_run(self) -> None:
-        """Process what native code has logged, after each of its runs."""
+    def after_run(self, reason: int) -> None:
+        """Process what native code has logged, after each of its runs. `reason` is the exit reason."""
 
     def counter(self) -> CycleCounter:
         """Return a counter for one translated function."""
@@ -72,10 +73,13 @@ class CycleCounting:
         self.address = accounting.address
         self.start = accounting.start
         self.stop = accounting.stop
-        self.after_run = accounting.flush_log
 
     def before_run(self) -> None:
         """Do nothing: the accounting has no state to prepare."""
+
+    def after_run(self, _reason: int) -> None:
+        """Account for what native code has logged."""
+        self._accounting.flush_log()
 
     def counter(self) -> CycleCounter:
         """Return a counter for one translated function."""
@@ -123,7 +127,7 @@ class ExecutionCounting:
     def before_run(self) -> None:
         """Do nothing."""
 
-    def after_run(self) -> None:
+    def after_run(self, _reason: int) -> None:
         """Do nothing: native code writes no log."""
 
     def counter(self) -> CycleCounter:
@@ -152,7 +156,11 @@ class ChangeCounting:
         self.start = log.start
         self.stop = log.stop
         self.before_run = log.before_run
-        self.after_run = log.after_native_run
+
+    def after_run(self, reason: int) -> None:
+        """Log changes by a complete boundary, and deliver the log. Python still has to finish an UNFINISHED one."""
+        if reason != UNFINISHED:
+            self._log.after_native_run()
 
     def counter(self) -> CycleCounter:
         """Return a counter for one translated function."""
@@ -178,7 +186,11 @@ class InstructionLogging:
         self.start = log.start
         self.stop = log.stop
         self.before_run = log.before_run
-        self.after_run = log.after_run
+        self._deliver = log.after_run
+
+    def after_run(self, _reason: int) -> None:
+        """Deliver the log."""
+        self._deliver()
 
     def counter(self) -> CycleCounter:
         """Return a counter for one translated function."""

@@ -400,7 +400,7 @@ class JitEngine:
             counting.before_run()
             reason = self._dispatch(record, env)
             if reason != RETFIE:  # after a RETFIE, the cycle of the last log entry may still change
-                counting.after_run()
+                counting.after_run(reason)
             return reason
 
         counting.start()

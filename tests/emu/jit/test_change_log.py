@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import random
 from collections.abc import Callable
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -138,6 +139,31 @@ def test_changes_by_stores_interrupts_and_sleep(path: Path, engine: str, cycles:
     assert {one.number for one in expected} == set(range(len(watched)))
     assert found == expected
     assert machine.snapshot() == stepping.snapshot()
+
+
+NESTED = """
+#include <p30F6014A.h>
+volatile int low, high;
+void __attribute__((interrupt, no_auto_psv)) _T1Interrupt(void) { IFS0bits.T1IF = 0; low++; }
+void __attribute__((interrupt, no_auto_psv)) _OC1Interrupt(void) { IFS0bits.OC1IF = 0; high++; }
+int main(void) {
+    PR1 = 96; PR2 = 130; OC1R = 20; OC1RS = 50; IPC0bits.T1IP = 5; IPC0bits.OC1IP = 7;
+    IEC0bits.T1IE = 1; IEC0bits.OC1IE = 1; OC1CON = 5; T1CON = 0x8000; T2CON = 0x8000;
+    for (;;) __asm__ volatile("pwrsav #1");
+}
+"""
+
+
+def test_a_boundary_with_two_interrupts_is_logged_once(tmp_path: Path) -> None:
+    """Native code enters the first; the event of the output compare, which Python fires, requests the second."""
+    (tmp_path / "p.c").write_text(NESTED)
+    assert driver.main(["-Os", "-g", str(tmp_path / "p.c"), "-o", str(tmp_path / "p.elf")]) == 0
+    stepping, machine = machine_of(tmp_path / "p.elf", "plain"), machine_of(tmp_path / "p.elf", "jit")
+    watched: list[Watched] = ["asleep", "ipl"]
+    expected = stepped(stepping, watched, CYCLES)
+    levels = [one.value for one in expected if one.number == 1]
+    assert (7, 5) in pairwise(levels)  # level 7 ends, level 5 has not begun
+    assert logged(machine, watched, lambda: slices(machine, CYCLES, CYCLES)) == expected
 
 
 @pytest.mark.parametrize("seed", range(6))

@@ -171,6 +171,20 @@ def test_native_counts_equal_single_stepping(nested):
     assert profile == counted(nested, "plain", 100_000)
 
 
+def test_entries_without_nesting_are_at_priority_7(nested):
+    """With NSTDIS every handler runs at priority 7, and so do the cycles of its entry (isa.md §14.2)."""
+    profiles = []
+    for engine in ("plain", "jit"):
+        machine = Machine(nested.chip, engine=engine)
+        machine.load(nested)
+        machine.write("INTCON1", 0x8000)
+        if engine == "jit":
+            machine.runner.threshold = 1
+        profiles.append(Profiler(machine, nested).run(20_000))
+    assert profiles[0].levels == profiles[1].levels
+    assert profiles[0].levels.keys() == {0, 7}
+
+
 def test_inclusive_cycles_leave_out_interrupts_and_count_recursion_once(nested):
     profile = counted(nested, "jit", 200_000)
     named = {edge.entry: nested.symbols.text(edge.entry) for edge in profile.edges}

@@ -205,10 +205,10 @@ class BoundaryCounter:
         """Return IR that accounts for the cycles from %cycle to `until` as Idle. `prefix` makes its names unique."""
         return ""
 
-    def entered(self, start: str, handler: str, site: str, stack: str, level: str, since: str) -> str:
-        """Return IR that accounts for the cycles from %cycle to `start` as entry of `handler` at CPU priority `level`.
+    def entered(self, start: str, handler: str, site: str, stack: str, level: str, ipl: str, since: str) -> str:
+        """Return IR that accounts for the cycles from %cycle to `start` as entry of `handler` at CPU priority `ipl`.
 
-        `site` was pushed at `stack`; the interrupt was requested in cycle `since`.
+        `site` was pushed at `stack`; the interrupt of `level` was requested in cycle `since`.
         """
         return ""
 
@@ -261,11 +261,11 @@ class AccountingBoundaryCounter(BoundaryCounter):
   %{p}.long = shl i64 %{p}.slept, 32
 {self._log(p, str(SLEPT), (until, f"%{p}.long", "0"))}"""
 
-    def entered(self, start: str, handler: str, site: str, stack: str, level: str, since: str) -> str:
+    def entered(self, start: str, handler: str, site: str, stack: str, level: str, ipl: str, since: str) -> str:
         """Return IR that adds to the handler's cell and logs the entry."""
         p = "c.in"
         return f"""{self._find(p)}
-  %{p}.level = mul i64 {level}, {self._level_bytes}
+  %{p}.level = mul i64 {ipl}, {self._level_bytes}
   %{p}.cells = getelementptr i8, ptr %{p}.accounting, i64 %{p}.level
   %{p}.word = lshr i64 {handler}, 1
   %{p}.cell = getelementptr i64, ptr %{p}.cells, i64 %{p}.word

@@ -15,7 +15,7 @@ from emu.dspic30f.exceptions.power import DRAIN_CYCLES
 from emu.dspic30f.jit.counters.cycle_counters import BoundaryCounter
 from emu.dspic30f.jit.ir.rule_emitter import BoundaryEmitter
 from emu.dspic30f.jit.ir.values import Emitter, Value, truth, wide
-from emu.dspic30f.state.state import IDLE, RUN, STACK_POINTER
+from emu.dspic30f.state.state import IDLE, IPL_MASK, RUN, STACK_POINTER
 from emu.system.events import NEVER
 from emu.system.rules import Cell, Number, cell_of, event_slot
 
@@ -228,7 +228,8 @@ def _enter(core: Core, m: BoundaryEmitter, counter: BoundaryCounter, winner: Num
     vectors = tuple(m.table(column, winner) for column in (p.ivt, p.aivt, p.slot))
     since, site, stack = exceptions.request_cycle(m, p, winner), m.get(p.pc), m.get(Cell(2 * STACK_POINTER, 16))
     exceptions.enter(m, p, level, since, Value(e, "%last", False), vectors)
-    e.line(counter.entered(*map(wide, (m.get(p.cycle), m.get(p.pc), site, stack, level, since))))
+    ipl = (m.get(p.sr) & IPL_MASK) >> IPL_MASK.bit_length() - 3
+    e.line(counter.entered(*map(wide, (m.get(p.cycle), m.get(p.pc), site, stack, level, ipl, since))))
     e.end("br label %entered.one")
     e.start("entered.one")
     e.line("%count = load i64, ptr %entered")
