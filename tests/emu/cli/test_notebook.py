@@ -64,6 +64,7 @@ def test_results_are_tables(machine):
     page = profile._repr_html_()
     assert page.count("<tr>") == 1 + len(profile.functions)
     assert re.search(r"<td[^>]*>_sum</td>", page)
+    assert sum(row["percent"] for row in profile.rows()) == pytest.approx(100)
     result = ApplicationCycles(1.0, {"yield": Operation("yield", [5, 7, 6], [5])})
     assert result.rows()[0] | {"operation": "yield", "count": 3, "min": 5, "median": 6, "max": 7} == result.rows()[0]
     assert "<td" in result._repr_html_()
