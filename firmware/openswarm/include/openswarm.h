@@ -132,10 +132,10 @@ void Sys_End_CriticalSection(void);
 uint16 Sys_Get_ProcessID(void);
 /* MTH | no | ~90 + 25 n | 16 | none.  SYS_UNKNOWN: no such thread. */
 sys_state Sys_Get_ProcessState(uint16 pid);
-/* MTH | no | ~80 + 18 n + 6 per byte | 16 | none.  Stack bytes never used so far; 0 also for an unknown PID and
+/* MTH | no | ~110 + 22 n + 10 per byte | 16 | none.  Stack bytes never used so far; 0 also for an unknown PID and
  * PID 0. */
 uint16 Sys_Get_UnusedStack(uint16 pid);
-/* MTHI | no | 6 per byte | 4 | none.  The same for the kernel stack (handlers, ISRs and scheduler). */
+/* MTHI | no | 20 + 8 per byte | 4 | none.  The same for the kernel stack (handlers, ISRs and scheduler). */
 uint16 Sys_Get_UnusedKernelStack(void);
 
 /* ---- Scheduling --------------------------------------------------------------------------------------------- */

@@ -27,6 +27,8 @@ PROMISES = {
     "Sys_Start_CriticalSection": ((), "20", 20, 1.0),
     "Sys_End_CriticalSection": ((), "20", 20, 1.0),
     "Sys_Get_ProcessState": ((), "~90 + 25 n", 90 + 25 * LOAD["n"], 1.0),
+    "Sys_Get_UnusedStack": ((), "~110 + 22 n + 10 per byte", 110 + 22 * LOAD["n"] + 10 * LOAD["u"], 1.0),
+    "Sys_Get_UnusedKernelStack": ((), "20 + 8 per byte", 20 + 8 * LOAD["u"], 1.0),
     "Sys_IsEventRegistered": ((), "~40 + 9 b", 40 + 9 * LOAD["b"], 1.0),
     "Sys_Set_Scheduler": ((), "28, refused 35", 35, 1.0),
     "Sys_Get_LostEvents": ((), "~50", 50, 1.0),
