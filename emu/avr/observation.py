@@ -19,11 +19,13 @@ STOP_NONE, STOP_PLACE, STOP_STEP, STOP_WRITE = range(4)
 class Observation(ctypes.Structure):
     """Settings and results of an observed run (`struct observation`)."""
 
-    _fields_ = [("steps", ctypes.c_uint64), ("passed", ctypes.c_uint64), ("reason", ctypes.c_uint32),
+    _fields_ = [("steps", ctypes.c_uint64), ("last_cycle", ctypes.c_uint64),
+                ("passed", ctypes.c_uint64), ("reason", ctypes.c_uint32),
                 ("watch_from", ctypes.c_uint16), ("watch_count", ctypes.c_uint16), ("site", ctypes.c_uint16),
                 ("counting", ctypes.c_uint8), ("places", ctypes.c_uint8 * (FLASH_BYTES // 2)),
                 ("cycles", ctypes.c_uint64 * (FLASH_BYTES // 2))]  # fmt: skip
     steps: int
+    last_cycle: int
     passed: int
     reason: int
     watch_from: int

@@ -7,15 +7,17 @@ import socket
 import sys
 from fractions import Fraction
 from functools import partial
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, cast
 
 from emu.boards import BOARDS
+from emu.commands import kilobot
 from emu.commands.board_options import add_board_options, board_of, set_up
 from emu.host.command import CommandError, Parser, port, seconds
 from emu.host.exit_status import BAD_INPUT, DONE
 
 if TYPE_CHECKING:
     from emu.dap.wire import Wire
+    from emu.debug.history import History
     from emu.machine.machine import Machine
     from emu.machine.stops import Stop
 
@@ -28,6 +30,10 @@ all commands. Without a terminal, standard input is a script with one command pe
 does the time limit of 60 simulated seconds, or of --seconds:
 
     printf 'break add if a == 3\\nrun\\nbacktrace\\n' | emu debug --tui firmware.elf
+
+With --board kilobot, images of avr-gcc with DWARF (-gdwarf-2) on an emulated Kilobot:
+
+    printf 'break set_color\\nrun\\nbacktrace\\n' | emu debug --tui firmware.elf --board kilobot
 
 Launch arguments: program (the ELF file; required), board, selector, camera (a picture), engine, strict, stopOnEntry,
 sourceRoots (folders that file names of the program are relative to).
@@ -58,7 +64,8 @@ def parser() -> Parser:
         action="store_true",
         help="strict mode as for `emu run`: null pointers and uninitialised reads are faults",
     )
-    add_board_options(made)
+    add_board_options(made, (*BOARDS, kilobot.BOARD))
+    kilobot.add_options(made)
     return made
 
 
@@ -93,13 +100,17 @@ def _run_prompt(options: argparse.Namespace) -> int:
 
     if options.port is not None or options.once:
         raise CommandError("--port and --once cannot be used with --tui")
-    machine = emu.load(options.tui, board=board_of(options), engine=options.engine, strict=options.strict)
-    set_up(machine, options)
+    if options.board == kilobot.BOARD:
+        machine = cast("Machine", kilobot.debugged(options, parser()))
+    else:
+        kilobot.refuse_options(options)
+        machine = emu.load(options.tui, board=board_of(options), engine=options.engine, strict=options.strict)
+        set_up(machine, options)
     limit = options.seconds or (None if sys.stdin.isatty() else SCRIPT_SECONDS)
     if limit is not None:
         _limit_time(machine, limit)
     try:
-        return Prompt("emu debug", lambda client: Server(client, lambda _launch: machine)).serve({}, sys.stdin)
+        return Prompt("emu debug", lambda client: Server(client, lambda _launch: machine, _record)).serve({}, sys.stdin)
     except TimeLimitReached as error:
         sys.stdout.flush()
         raise CommandError(str(error)) from None
@@ -131,7 +142,8 @@ def _limit_time(machine: Machine, limit: Fraction) -> None:
 def _refuse_options_of_the_prompt(options: argparse.Namespace) -> None:
     """Raise CommandError for a command-line option that an editor sets in its launch configuration."""
     made = parser()
-    for name in ("engine", "strict", "seconds", "board", "crystal", "selector", "camera", "sensor", "stimulus"):
+    for name in ("engine", "strict", "seconds", "board", "crystal", "selector", "camera", "sensor", "stimulus",
+                 *kilobot.OWN):  # fmt: skip
         if getattr(options, name) != made.get_default(name):
             raise CommandError(f"--{name} needs --tui; for an editor, set `{name}` in the launch configuration")
 
@@ -140,10 +152,19 @@ def _serve(wire: Wire) -> int:
     """Serve one debugger client. Return the exit status."""
     from emu.dap.server import Server
 
-    Server(wire, machine_of).serve()
+    Server(wire, machine_of, _record).serve()
     if wire.problem:
         print(f"emu debug: invalid message from the client: {wire.problem}", file=sys.stderr, flush=True)
     return BAD_INPUT if wire.problem else DONE
+
+
+def _record(machine: Machine) -> History:
+    """Return a new recording of a machine."""
+    from emu.debug.avr.history import KilobotHistory
+    from emu.debug.avr.machine import DebuggedKilobot
+    from emu.debug.history import History
+
+    return KilobotHistory(machine) if isinstance(machine, DebuggedKilobot) else History(machine)
 
 
 def machine_of(arguments: dict[str, Any]) -> Machine:
@@ -154,6 +175,11 @@ def machine_of(arguments: dict[str, Any]) -> Machine:
     if not program:
         raise ValueError("launch needs `program`, the path of an ELF file")
     board: Any = arguments.get("board", BOARDS[0])
+    if board == kilobot.BOARD:
+        other = [name for name in ("selector", "camera", "engine", "strict") if arguments.get(name)]
+        if other:
+            raise ValueError(f"`{other[0]}` does not apply to the board {board}")
+        return cast("Machine", kilobot.debugged_image(program))
     if board == BOARDS[0]:
         from emu.boards.epuck.board import Epuck
 

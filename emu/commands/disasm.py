@@ -8,12 +8,13 @@ import sys
 from collections.abc import Iterator
 
 from emu.commands.image_option import add_chip_option, image_of
+from emu.debug.disassembly import Item
 from emu.dspic30f.state.state import PC_MASK
 from emu.host.command import CommandError, Parser
 from emu.host.exit_status import DONE
 from emu.host.sources import SourceFinder
 from emu.image.model import Image
-from emu.instruments.disassembly import Item, items
+from emu.instruments.disassembly import items
 
 
 def parser() -> Parser:

@@ -1,4 +1,4 @@
-"""The board `kilobot` of `emu run` and `emu profile`: options of an ATmega328P with its own engine, run and profile."""
+"""The board `kilobot` of `emu run`, `emu profile` and `emu debug`: an ATmega328P with its own engine."""
 
 from __future__ import annotations
 
@@ -12,13 +12,14 @@ from emu.host.command import CommandError, Parser
 from emu.host.exit_status import DONE, FAULT, FAULT_AS_STATUS, INTERRUPTED, LIMIT_AS_STATUS
 
 if TYPE_CHECKING:
+    from emu.debug.avr.machine import DebuggedKilobot
     from emu.profile.cycle_shares import CodeLocations, Profile
 
 BOARD: Final = "kilobot"
 OWN: Final = ("ohc", "uid")
 """Options of the Kilobot alone."""
 SHARED: Final = ("image", "board", "seconds", "cycles", "json", "exit_code", "cache", "skip", "group", "top", "lines",
-                 "callgrind")  # fmt: skip
+                 "callgrind", "tui")  # fmt: skip
 """Options of the commands that apply to a Kilobot, too."""
 
 
@@ -65,6 +66,20 @@ def profile_of(options: argparse.Namespace, made: Parser) -> tuple[Profile, Code
     robot = SingleKilobot(image, uid=options.uid or 0, command=options.ohc or "run")
     skip = int(options.skip * HZ)
     return profile_kilobot(robot, skip + max(1, int(options.seconds * HZ)), skip), CodeLocations(image)
+
+
+def debugged(options: argparse.Namespace, made: Parser) -> DebuggedKilobot:
+    """Return a Kilobot at power-on for `emu debug --tui`. Raises as `profile_of`."""
+    refuse_other_options(options, made)
+    return debugged_image(options.tui, options.uid or 0, options.ohc or "run")
+
+
+def debugged_image(path: str, uid: int = 0, command: str = "run") -> DebuggedKilobot:
+    """Return a Kilobot at power-on with an image, for the debugger. Raises LoadError."""
+    from emu.avr.image import load_avr_image
+    from emu.debug.avr.machine import DebuggedKilobot
+
+    return DebuggedKilobot(load_avr_image(path), uid=uid, command=command)
 
 
 def run(options: argparse.Namespace, made: Parser) -> int:

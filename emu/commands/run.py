@@ -229,9 +229,9 @@ def _native_address(machine: Machine, text: str) -> int:
 
 def _dump_native(address: int, machine: Machine, image: Image, text: str) -> None:
     """Print the native code compiled for an address or function. Raises CommandError if there is none."""
+    from emu.debug.disassembly import instruction
     from emu.dspic30f.jit.dump import dump
     from emu.dspic30f.jit.engine import JitEngine
-    from emu.instruments.disassembly import instruction
 
     assert isinstance(machine.runner, JitEngine)  # checked by _native_address
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any, Final
 
+from emu.avr.observation import WATCH_BYTES
 from emu.dap.breakpoints import Breakpoint, hit_condition_error
-from emu.dap.debuggee import STACK_POINTER
 from emu.dap.state_requests import StateRequests
 from emu.dap.variables import Row
 from emu.debug.expressions.expression import evaluate
@@ -90,7 +90,8 @@ class BreakpointRequests(StateRequests):
         if problem := self._not_in_memory(address, size):
             return {"dataId": None, "description": problem}
         entries = [one.raw.entry for one in self._debuggee.frames() if one.raw.entry is not None]
-        stays = not entries or not min(entries) <= address < self._debuggee.machine.w[STACK_POINTER]
+        stack = self._debuggee.stack
+        stays = not entries or not min(*entries, stack) <= address < max(*entries, stack)
         text = f"{arguments['name']} ({size} bytes at {address:#06x})"
         return {
             "dataId": f"{address:04x}/{size}",
@@ -120,6 +121,8 @@ class BreakpointRequests(StateRequests):
             address, _, size = str(one["dataId"]).partition("/")
             access = one.get("accessType") or "write"
             problem = self._not_in_memory(int(address, 16), int(size))
+            if not problem and not self._debuggee.inspector.processor.has_native_instruments:
+                problem = _beyond_watch(arguments, access, int(size))
             if access not in ACCESSES:
                 problem = f"expected one of {', '.join(ACCESSES)}, not {access!r}"
             addresses = () if problem else (int(address, 16),)
@@ -132,3 +135,12 @@ class BreakpointRequests(StateRequests):
         rows = self._sources.lines(str(arguments["source"].get("path", "")))
         lines = sorted({row.line for row in rows if first <= row.line <= last})
         return {"breakpoints": [{"line": line} for line in lines]}
+
+
+def _beyond_watch(arguments: Row, access: str, size: int) -> str:
+    """Return why a machine that watches one range for changes does not support a data breakpoint; empty if it does."""
+    if access != "write":
+        return "reads are not observed on this processor: use `watch`, which stops at changes"
+    if len(arguments["breakpoints"]) > 1:
+        return "this processor has one watchpoint at a time"
+    return f"{size} bytes are more than the {WATCH_BYTES} that can be watched" if size > WATCH_BYTES else ""

@@ -45,13 +45,14 @@ def _members(inspector: Inspector, frame: Frame | None, whole: str) -> Iterator[
 
 def _all(inspector: Inspector, frame: Frame | None) -> Iterator[Name]:
     """Yield all visible names. A later name hides an earlier equal one."""
+    prefix = inspector.processor.symbol_prefix
     symbols = (one for one in inspector.image.symbols.all if one.names_content)
     for one in symbols:
-        yield one.name.removeprefix("_"), "function" if one.space == "code" else "variable"
+        yield one.name.removeprefix(prefix), "function" if one.space == "code" else "variable"
     yield from ((name, "enum") for name in inspector.debug.constants)
     yield from ((name, "variable") for name in inspector.debug.globals)
     yield from ((name, "property") for name in inspector.image.chip.sfrs)
-    yield from ((f"W{number}", "property") for number in range(16))
+    yield from ((name, "property") for name in inspector.processor.register_names)
     yield from ((name, "property") for name in ("PC", "cycle"))
     if frame is not None:
         unit = frame.scopes[0].unit if frame.scopes else -1

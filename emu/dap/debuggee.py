@@ -9,22 +9,21 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, cast
 
 from emu.dap.breakpoints import Breakpoint
 from emu.dap.logged_writes import can_log_writes, logged_writes, site_of
 from emu.debug.expressions.filters import filter_of
 from emu.debug.history import History
 from emu.debug.inspector import Frame, Inspector
+from emu.debug.processor import Processor
 from emu.debug.threads import Thread, Threads
-from emu.dspic30f.isa.codec import decode_for_execution
-from emu.dspic30f.isa.facts import facts_of
-from emu.dspic30f.isa.flow import Call
 from emu.image.lines import SourceLine
-from emu.machine.stops import SLEEP_CYCLES, STILL_ASLEEP
+from emu.machine.stops import CHANGED, SLEEP_CYCLES, STILL_ASLEEP
 from emu.system.filters import Filter
 
 if TYPE_CHECKING:
+    from emu.debug.avr.machine import DebuggedKilobot
     from emu.dspic30f.change_log import Change
     from emu.machine.machine import Machine
     from emu.machine.stops import Stop
@@ -33,9 +32,6 @@ SLICE_CYCLES: Final = 400_000
 """Cycles between two polls for requests of the client."""
 POLL_STEPS: Final = 2_000
 """Single steps between two polls for requests of the client."""
-STACK_POINTER: Final = 15
-EXCEPTION_FRAME_BYTES: Final = 4
-"""Number of bytes that interrupt entry pushes onto the stack."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,6 +71,20 @@ class Debuggee:
         self._limit: int | None = None
         """Cycle at which the run ends."""
 
+    @property
+    def _processor(self) -> Processor:
+        return self.inspector.processor
+
+    @property
+    def _kilobot(self) -> DebuggedKilobot:
+        """The machine, if its processor has no native instruments."""
+        return cast("DebuggedKilobot", self.machine)
+
+    @property
+    def stack(self) -> int:
+        """Value of the stack pointer."""
+        return self.machine.w[self._processor.stack_pointer]
+
     # Breakpoints
 
     def set_breakpoints(self, key: str, breakpoints: list[Breakpoint]) -> None:
@@ -108,7 +118,8 @@ class Debuggee:
         """Return the filter of the breakpoints at an address; None if every arrival matters or there are several."""
         conditions = [one.condition for one in self.all() if one.kind != "data" and place in one.addresses]
         is_target = self._run_target is not None and place in self._run_target[0]
-        if is_target or len(conditions) != 1 or not conditions[0]:
+        native = self._processor.has_native_instruments
+        if is_target or len(conditions) != 1 or not conditions[0] or not native:
             return [None]
         return [filter_of(self.inspector, conditions[0], place)]
 
@@ -135,6 +146,9 @@ class Debuggee:
     def _run(self) -> StopEvent | None:
         """Run until a stop. Return None for a requested pause and at the target of `run_to`."""
         data = [one for one in self.all() if one.kind == "data"]
+        if data and not self._processor.has_native_instruments:
+            with self._kilobot.watching(data[0].addresses[0], data[0].size):
+                return self._run_slices(data, [])
         is_simple = self.history.environment is None and not self.history.is_past
         if data and is_simple and can_log_writes(self.machine, data):
             with logged_writes(self.machine, data) as writes:
@@ -155,6 +169,11 @@ class Debuggee:
                 stop = self.history.advance(min(self.machine.cycle + SLICE_CYCLES, self._limit or sys.maxsize))
             finally:
                 self.machine.replay_condition = None
+            if stop is not None and stop.detail == CHANGED:
+                event = self._event_of_change(data[0])
+                if event is not None:
+                    return event
+                continue
             if writes:
                 event = self._event_of_writes(data, writes)
                 writes.clear()
@@ -175,6 +194,12 @@ class Debuggee:
         hit = [data[number] for number in sorted({one.number for one in writes})]
         ids = tuple(one.id for one in hit if one.should_stop(self.inspector, self._write_output))
         place = self.inspector.where(site_of(writes[0]))
+        return StopEvent("data breakpoint", f"write at {place}", ids) if ids else None
+
+    def _event_of_change(self, one: Breakpoint) -> StopEvent | None:
+        """Return the event for a change of watched bytes; None if the data breakpoint continues."""
+        place = self.inspector.where(self._kilobot.last_site)
+        ids = (one.id,) if one.should_stop(self.inspector, self._write_output) else ()
         return StopEvent("data breakpoint", f"write at {place}", ids) if ids else None
 
     def _is_limit_reached(self) -> bool:
@@ -292,14 +317,14 @@ class Debuggee:
             if event is not None:
                 return event
             here = self._line()
-            top = self.machine.w[STACK_POINTER]
+            top = self.stack
             if here is None:
                 continue
             start = self.inspector.function_start(self.machine.pc)
             if start is not None and self.machine.pc < self.inspector.prologue_end(start):
                 has_entered = True
                 continue
-            if entry is not None and top < entry:
+            if entry is not None and self._processor.has_left(top, entry):
                 return StopEvent("step")
             if (here.file, here.line) != (line and (line.file, line.line)) and here.start == self.machine.pc:
                 return StopEvent("step")
@@ -313,21 +338,19 @@ class Debuggee:
         A call counts as one instruction, except with `into` and a function that has line information.
         """
         machine = self.machine
-        pc, top = machine.pc, machine.w[STACK_POINTER]
-        insn = decode_for_execution(machine.program.word(pc), machine.program.word(pc + 2))
-        calls = insn is not None and facts_of(insn).flow is Call
+        pc, top = machine.pc, self.stack
+        return_pc = self._processor.return_address(pc)
         event = self._step()
         if event is not None:
             return event
         if (
             self.inspector.is_handler(machine.pc)
-            and machine.w[STACK_POINTER] == top + EXCEPTION_FRAME_BYTES
-            and not calls
+            and self.stack == self._processor.stack_in_handler(top)
+            and return_pc is None
         ):
-            return self.run_to([pc], lambda: machine.w[STACK_POINTER] == top)
-        if calls and insn is not None and not (into and self._line() is not None):
-            return_pc = pc + 2 * insn.words
-            return self.run_to([return_pc], lambda: machine.w[STACK_POINTER] == top)
+            return self.run_to([pc], lambda: self.stack == top)
+        if return_pc is not None and not (into and self._line() is not None):
+            return self.run_to([return_pc], lambda: self.stack == top)
         return None
 
     def step_out(self) -> StopEvent:
@@ -335,8 +358,8 @@ class Debuggee:
         frames = [one for one in self.inspector.frames() if one.kind != "inlined"]
         if len(frames) < 2 or frames[0].raw.entry is None:
             return StopEvent("step", "there is no caller")
-        top = frames[0].raw.entry - 4
-        return self.run_to([frames[1].pc], lambda: self.machine.w[STACK_POINTER] == top) or StopEvent("step")
+        top = self._processor.stack_after_return(frames[0].raw.entry)
+        return self.run_to([frames[1].pc], lambda: self.stack == top) or StopEvent("step")
 
     def goto(self, cycle: int) -> StopEvent:
         """Go to a cycle. If it is after the recording, run to it unless the machine stops earlier."""
@@ -427,9 +450,9 @@ class Debuggee:
         start = self.inspector.function_start(self.machine.pc)
         if frame is None or frame.raw.entry is None or start is None:
             return StopEvent("step", "there is no caller")
-        machine, entry = self.machine, frame.raw.entry
-        if machine.pc != start or machine.w[STACK_POINTER] != entry:
-            self.history.run_back([start], lambda: machine.w[STACK_POINTER] == entry)
+        machine, top = self.machine, self._processor.stack_at_entry(frame.raw.entry)
+        if machine.pc != start or self.stack != top:
+            self.history.run_back([start], lambda: self.stack == top)
         return self.reverse_step_instruction()
 
     def reverse_continue(self) -> StopEvent:
@@ -475,7 +498,7 @@ class Debuggee:
 
     def threads(self) -> list[Thread]:
         """Return the threads of OpenSwarm; empty for other firmware."""
-        return Threads(self.inspector).all()
+        return Threads(self.inspector).all() if self._processor.has_native_instruments else []
 
     def frames(self) -> list[Frame]:
         """Return the current call stack."""

@@ -167,7 +167,9 @@ class StateRequests(ABC):
 
     def _do_sfrs(self, _arguments: Row) -> Row:
         """Return the registers for an editor's register view; `sfrs` is a request of this project."""
-        return {"groups": sfr_groups(self._debuggee.machine)}
+        target = self._debuggee
+        groups = target.inspector.processor.register_groups()
+        return {"groups": sfr_groups(target.machine) if groups is None else groups}
 
 
 def _size(arguments: Row, name: str) -> int:

@@ -16,9 +16,7 @@ from emu.debug.dwarf.types import UNSIGNED, parts_of
 from emu.debug.inspector import Frame, Inspector, Value
 from emu.host.sources import SourceFinder
 from emu.image.lines import SourceLine
-from emu.instruments.disassembly import instruction
 
-REGISTERS: Final = 16
 FLAGS: Final = ("C", "Z", "OV", "N", "RA", "DC", "DA", "SAB", "OAB", "SB", "SA", "OB", "OA")
 POSTFIX: Final = re.compile(r"[\w$][\w$.\[\]>-]*|\(\*\(.*\)\)[\w.\[\]]*")
 """Expressions to which a member access can be appended without parentheses."""
@@ -108,12 +106,13 @@ class ReferenceTable:
 
     def _registers(self, frame: Frame) -> Iterator[tuple[str, Value | None, str]]:
         view = self.inspector.view(frame)
-        for number in range(REGISTERS):
+        processor = self.inspector.processor
+        for number, name in enumerate(processor.register_names):
             known = view.register(number) is not None
-            value = Value(UNSIGNED[2], (Piece("register", number),), view, f"W{number}")
-            yield f"W{number}", value if known else None, f"W{number}" if known else "<not known in this frame>"
+            value = Value(UNSIGNED[processor.register_size(number)], (Piece("register", number),), view, name)
+            yield name, value if known else None, name if known else "<not known in this frame>"
         yield "PC", None, f"{frame.pc:#08x}"
-        yield "SR", self._sfr("SR"), "SR"
+        yield processor.status_register, self._sfr(processor.status_register), processor.status_register
         yield "cycle", None, f"{self.inspector.machine.cycle:,}"
 
     def _sfr(self, name: str) -> Value:
@@ -252,9 +251,9 @@ def disassembly_rows(inspector: Inspector, sources: SourceFiles, address: int, c
         if not 0 <= at < end:
             rows.append({"address": f"{max(at, 0):#08x}", "instruction": "", "presentationHint": "invalid"})
             continue
-        item = None if second else instruction(inspector.image, at, program.word(at), program.word(at + 2))
+        item = None if second else inspector.processor.instruction(at)
         row: Row = {"address": f"{at:#08x}", "instructionBytes": f"{program.word(at):06x}",
-                    "instruction": item.text if item is not None else "" if second else ".pword"}  # fmt: skip
+                    "instruction": item[0] if item is not None else "" if second else ".pword"}  # fmt: skip
         line = inspector.image.lines.find(at)
         if line is not None and line.start == at:
             row |= {"location": sources.row(line.file), "line": line.line}
@@ -266,6 +265,5 @@ def disassembly_rows(inspector: Inspector, sources: SourceFiles, address: int, c
 
 
 def _words(inspector: Inspector, at: int) -> int:
-    program = inspector.machine.program
-    item = instruction(inspector.image, at, program.word(at), program.word(at + 2))
-    return len(item.words) if item is not None else 1
+    item = inspector.processor.instruction(at)
+    return item[1] if item is not None else 1

@@ -5,26 +5,25 @@ Input: a machine between two instructions. Outputs: `Frame`s and `Value`s. Only 
 
 from __future__ import annotations
 
-from bisect import bisect_right
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Final
 
+from emu.debug.dspic30f import Dspic30f
 from emu.debug.dwarf import location
 from emu.debug.dwarf.types import UNSIGNED, Type, decode, decode_member, encode, parts_of, text_of
-from emu.debug.dwarf.units import DebugInfo, Scope, Variable, debug_of
-from emu.debug.unwind import CodeAnalysis, RawFrame, Unwinder
+from emu.debug.dwarf.units import DebugInfo, Scope, Variable
+from emu.debug.processor import Debugged, Processor
+from emu.debug.unwind import RawFrame
 from emu.image.lines import SourceLine
 from emu.image.model import Image
 
 if TYPE_CHECKING:
     from emu.machine.machine import Machine
 
-REGISTERS: Final = 16
-STACK_POINTER: Final = 15
-FRAME_BASE_OPERATION: Final = bytes([location.FBREG])
-"""DWARF operation with which the location of a frame variable begins."""
+FRAME_OPERATIONS: Final = (location.FBREG, location.BREG0 + 28)
+"""DWARF operations with which the location of a frame variable begins: the frame base, or avr-gcc's frame pointer Y."""
 REMOVED_BY_LINKER: Final = bytes(location.ADDR_0)
 """Location expression that the linker writes for a removed variable."""
 
@@ -62,33 +61,18 @@ class Inspector:
             raise ValueError("nothing is loaded")
         self.machine: Final = machine
         self.image: Final[Image] = machine.image
-        self._starts: Final = [block.base for block in self.image.blocks if block.is_code]
+        self.processor: Final[Processor] = machine.processor() if isinstance(machine, Debugged) else Dspic30f(machine)
+        """What distinguishes the machine's processor and compiler."""
         self._bodies: Final[dict[int, int]] = {}
-        self._ends: Final = [block.end for block in self.image.blocks if block.is_code]
 
     @cached_property
     def debug(self) -> DebugInfo:
         """Functions, variables and types."""
-        return debug_of(self.image)
-
-    @cached_property
-    def unwinder(self) -> Unwinder:
-        """Unwinder for the call stacks of this image."""
-        return Unwinder(
-            CodeAnalysis(self.machine.program.word, self.is_code), self.function_start, self._vector_targets
-        )
-
-    @cached_property
-    def _vector_targets(self) -> frozenset[int]:
-        """Addresses stored in the interrupt vectors."""
-        vectors = self.image.chip.vectors
-        targets = {self.image.word(table) for vector in vectors for table in (vector.ivt, vector.aivt)}
-        return frozenset(target for target in targets if target is not None)
+        return self.processor.debug
 
     def is_code(self, pc: int) -> bool:
         """Whether the image contains an instruction at `pc`."""
-        index = bisect_right(self._starts, pc) - 1
-        return index >= 0 and pc < self._ends[index]
+        return self.processor.is_code(pc)
 
     def function_start(self, pc: int) -> int | None:
         """Return the address of the function that contains `pc`, None outside the program."""
@@ -118,7 +102,7 @@ class Inspector:
 
     def is_handler(self, start: int | None) -> bool:
         """Whether `start` is the address of an exception handler."""
-        return start is not None and start in self._vector_targets
+        return start is not None and start in self.processor.handlers
 
     def function_name(self, pc: int) -> str:
         """Return the C name of the function that contains `pc`."""
@@ -126,7 +110,7 @@ class Inspector:
         if function is not None and function.name:
             return function.name
         symbol = self.image.symbols.code(pc) if self.is_code(pc) else None
-        return symbol[0].name.removeprefix("_") if symbol is not None else f"{pc:#08x}"
+        return symbol[0].name.removeprefix(self.processor.symbol_prefix) if symbol is not None else f"{pc:#08x}"
 
     def where(self, pc: int) -> str:
         """Return `pc` as text with function and source line: `0x000124 (worker+0x4, main.c:12)`."""
@@ -140,23 +124,19 @@ class Inspector:
     # Call stacks
 
     def registers(self) -> tuple[int | None, ...]:
-        """Return the current values of W0 to W15."""
-        return tuple(self.machine.record.u16[:REGISTERS])
+        """Return the current values of the registers, by DWARF number."""
+        return tuple(self.machine.w[number] for number in range(len(self.processor.register_names)))
 
     def frames(self, pc: int | None = None, registers: tuple[int | None, ...] | None = None) -> list[Frame]:
         """Return the call stack for a PC and register values, by default those of the machine."""
         if pc is None:
             pc = self.machine.pc
-        raws = self.unwinder.frames(pc, registers or self.registers(), self._ram_word)
+        raws = self.processor.frames(pc, registers or self.registers(), self.function_start)
         found: list[Frame] = []
         for number, raw in enumerate(raws):
             exact = number == 0 or raws[number - 1].is_handler
             found += self._entries(raw, raw.pc if exact else raw.pc - 2)
         return found
-
-    def _ram_word(self, address: int) -> int | None:
-        ram = self.image.chip.data["ram"]
-        return self.machine.record.u16[address >> 1] if ram.start <= address < ram.end else None
 
     def _entries(self, raw: RawFrame, at: int) -> Iterator[Frame]:
         """Yield the entries of one physical frame: the functions inlined at `at`, then the function itself."""
@@ -228,6 +208,8 @@ class Inspector:
             raise location.Unavailable("optimised out")
         if code == REMOVED_BY_LINKER:
             raise location.Unavailable("not in the program: nothing uses it")
+        if why := self.processor.unreadable(code):
+            raise location.Unavailable(why)
         if (
             is_frame_variable(variable)
             and (start := self.function_start(view.pc)) is not None
@@ -240,13 +222,17 @@ class Inspector:
     def _frame_base(self, frame: Frame | None) -> int:
         if frame is None or not frame.scopes:
             raise location.Unavailable("its frame is not known")
-        if frame.raw.entry is not None and frame.kind != "inlined":
-            return frame.raw.entry
-        function = self.debug.function(self.view(frame).pc)
-        code = function.frame_base.at(self.view(frame).pc) if function and function.frame_base else None
+        entry = frame.raw.entry
+        if entry is not None and frame.kind != "inlined" and self.processor.entry_is_frame_base:
+            return entry
+        view = self.view(frame)
+        function = self.debug.function(view.pc)
+        code = function.frame_base.at(view.pc) if function and function.frame_base else None
         if code is None:
             raise location.Unavailable("its frame is not known")
-        found = location.address_of(location.pieces_of(code, self.view(frame), lambda: 0))
+        pieces = location.pieces_of(code, view, lambda: entry or 0)
+        is_register = len(pieces) == 1 and pieces[0].kind == "register"
+        found = view.address_in(pieces[0].at) if is_register else location.address_of(pieces)
         if found is None:
             raise location.Unavailable("its frame is not known")
         return found
@@ -265,7 +251,7 @@ class Inspector:
 def is_frame_variable(variable: Variable) -> bool:
     """Whether the variable has a fixed location in its function's frame."""
     entries = variable.location.entries if variable.location is not None else ()
-    return len(entries) == 1 and entries[0][0] is None and entries[0][2][:1] == FRAME_BASE_OPERATION
+    return len(entries) == 1 and entries[0][0] is None and bool(entries[0][2]) and entries[0][2][0] in FRAME_OPERATIONS
 
 
 def has_frame_variables(scope: Scope) -> bool:
@@ -278,9 +264,11 @@ class FrameView:
 
     def __init__(self, inspector: Inspector, frame: Frame | None) -> None:
         self._machine: Final = inspector.machine
+        self._processor: Final = inspector.processor
         self.frame: Final = frame
+        top = self._processor.stack_pointer
         self._is_innermost: Final = frame is None or (
-            frame.raw.pc == self._machine.pc and frame.raw.registers[STACK_POINTER] == self._machine.w[STACK_POINTER]
+            frame.raw.pc == self._machine.pc and frame.raw.registers[top] == self._machine.w[top]
         )
 
     @property
@@ -288,16 +276,29 @@ class FrameView:
         """Address for the lookup of variables. For a caller's frame it is inside the call instruction."""
         return self._machine.pc if self.frame is None else self.frame.at
 
+    def register_size(self, number: int) -> int:
+        """Return the size of a register in bytes."""
+        return self._processor.register_size(number)
+
+    def register_name(self, number: int) -> str:
+        """Return the name of the register with a DWARF number."""
+        names = self._processor.register_names
+        return names[number] if number < len(names) else f"register {number}"
+
     def register(self, number: int) -> int | None:
-        """Return the value of Wn, None if it is unknown in this frame."""
-        if number >= REGISTERS:
+        """Return the value of a register, None if it is unknown in this frame."""
+        if number >= len(self._processor.register_names):
             return None
         if self.frame is None or self._is_innermost:
             return self._machine.w[number]
         return self.frame.raw.registers[number]
 
+    def address_in(self, number: int) -> int | None:
+        """Return the address that a register holds, None if it is unknown in this frame."""
+        return self._processor.address_in(self.register, number)
+
     def set_register(self, number: int, value: int) -> None:
-        """Set Wn of the innermost frame. Raises ValueError for another frame."""
+        """Set a register of the innermost frame. Raises ValueError for another frame."""
         if not self._is_innermost:
             raise ValueError("only registers of the innermost frame can be changed")
         self._machine.w[number] = value
@@ -308,11 +309,7 @@ class FrameView:
 
     def set_memory(self, address: int, data: bytes) -> None:
         """Write bytes of data space; peripheral registers react as to an instruction. Raises ValueError."""
-        value = int.from_bytes(data, "little")
-        if address < self._machine.bus.end and len(data) <= 2:
-            self._machine.write(address, value, len(data))
-        else:
-            self._machine.poke(address, value, len(data))
+        self._processor.write(address, data)
 
 
 class Value:
@@ -420,7 +417,8 @@ class Value:
             if first < last:
                 skip = first - begin
                 if piece.kind == "register":
-                    found.append(location.Piece("register", piece.at + skip // 2, last - first, skip=skip % 2))
+                    number, skip = divmod(skip + piece.skip, self._view.register_size(piece.at))
+                    found.append(location.Piece("register", piece.at + number, last - first, skip=skip))
                 elif piece.kind == "memory":
                     found.append(location.Piece("memory", piece.at + skip, last - first))
                 else:

@@ -14,9 +14,9 @@ from typing import TYPE_CHECKING, Any, BinaryIO, Final, TextIO
 
 import numpy as np
 
+from emu.debug.disassembly import instruction
 from emu.dspic30f.instruction_log import BOUNDARY, CORE_BYTES, CORE_END, Entries, InstructionLog
 from emu.image.model import Image
-from emu.instruments.disassembly import instruction
 from emu.native_library import ADDRESS, INT, functions
 
 if TYPE_CHECKING:

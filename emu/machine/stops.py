@@ -15,6 +15,8 @@ SLEEP_CYCLES: Final = 1 << 24
 """Maximum length of a sleep within one step that has no limit, in Tcy (1.1 s of an e-puck)."""
 STILL_ASLEEP: Final = "the CPU still sleeps: no enabled interrupt has woken it"
 """Detail of the stop of a step in Idle or Sleep mode that reached its limit before an interrupt."""
+CHANGED: Final = "a watched byte has changed"
+"""Detail of the stop of a debugged Kilobot at its watched range."""
 RESETS_KEPT: Final = 16
 """Capacity of `Machine.resets`."""
 RESET_LOOP: Final = 8

@@ -16,6 +16,8 @@ PER_ROW: Final = 8
 ROW_BYTES: Final = 16
 INTEGER: Final = re.compile(r"0x[0-9a-fA-F]+|-?\d+")
 FORMATS: Final = "xdutca"
+WORKING: Final = re.compile(r"[WR]\d+")
+"""Names of working registers."""
 
 
 def frame(row: Row) -> str:
@@ -68,11 +70,13 @@ def number(text: str, form: str) -> str:
 
 def registers(rows: Sequence[Row]) -> str:
     """Return the working registers, eight per line, then the other registers."""
-    texts = [(one["name"], f"{int(one['value']):#06x}" if one["value"].isdecimal() else one["value"]) for one in rows]
-    working = [f"{name}={value}" for name, value in texts if name.startswith("W")]
+    digits = {"uint8": 4, "uint16": 6}
+    texts = [(one["name"], f"{int(one['value']):#0{digits.get(one.get('type', ''), 6)}x}" if one["value"].isdecimal()
+              else one["value"]) for one in rows]  # fmt: skip
+    working = [f"{name}={value}" for name, value in texts if WORKING.fullmatch(name)]
     lines = ["  ".join(f"{one:<11}" for one in working[at : at + PER_ROW]) for at in range(0, len(working), PER_ROW)]
     return "\n".join([*(line.rstrip() for line in lines),
-                      *(f"{name} {value}" for name, value in texts if not name.startswith("W"))])  # fmt: skip
+                      *(f"{name} {value}" for name, value in texts if not WORKING.fullmatch(name))])  # fmt: skip
 
 
 def sfrs(groups: Sequence[Row], requested: str) -> str:

@@ -17,7 +17,7 @@ TOPICS: Final = {
     "breakpoints": "all breakpoints by number",
     "frame": "location of the selected frame",
     "locals": "parameters and locals of the selected frame",
-    "registers": "W0 to W15, PC, SR of the selected frame",
+    "registers": "working registers, PC and flags of the selected frame",
     "sfr": "[PATTERN]: registers by name or peripheral, with fields",
     "statics": "static variables of the file",
     "threads": "threads of OpenSwarm with stack use",

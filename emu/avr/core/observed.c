@@ -6,6 +6,7 @@ enum { STOP_NONE, STOP_PLACE, STOP_STEP, STOP_WRITE }; // reasons of RUN_BREAK
 
 struct observation {
     u64 steps;      // steps after which the run ends, 0: no limit. A step is an instruction or an interrupt entry
+    u64 last_cycle; // first cycle of the last instruction or interrupt entry
     u64 passed;     // cycle of the last stop at a place; the run does not stop there again
     u32 reason;     // of the stop; the caller sets it to STOP_NONE before it continues
     u16 watch_from, watch_count; // range of data memory, at most WATCH_BYTES; a count of 0: none
@@ -46,7 +47,7 @@ i64 avr_run_observed(struct avr *m, const struct insn *code, u64 until, struct o
             continue; // to sleep and to wake up is no step
         else if (m->resets != resets)
             pc = m->starts_in_boot ? m->boot_start : 0;
-        o->site = (u16)pc;
+        o->site = (u16)pc, o->last_cycle = from;
         if (o->counting)
             o->cycles[pc & PC_MASK] += cycles;
         if (o->watch_count && __builtin_memcmp(before, m->data + o->watch_from, o->watch_count))

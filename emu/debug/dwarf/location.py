@@ -41,11 +41,20 @@ _FIXED: Final = {
 class View(Protocol):
     """Registers and memory as visible from one frame of a call stack."""
 
+    def register_size(self, number: int) -> int:
+        """Return the size of a register in bytes: 2 for W registers and stack pointers, 1 for others of an AVR."""
+
+    def register_name(self, number: int) -> str:
+        """Return the name of the register with a DWARF number."""
+
     def register(self, number: int) -> int | None:
-        """Return the value of Wn, None if it is unknown in this frame."""
+        """Return the value of a register by its DWARF number, None if it is unknown in this frame."""
+
+    def address_in(self, number: int) -> int | None:
+        """Return the address that a register holds, on an AVR with the next register; None if it is unknown."""
 
     def set_register(self, number: int, value: int) -> None:
-        """Set Wn. Raises ValueError if this frame does not permit it."""
+        """Set a register. Raises ValueError if this frame does not permit it."""
 
     def memory(self, address: int, size: int) -> bytes:
         """Return bytes of data space without side effects. Raises ValueError for unimplemented addresses."""
@@ -101,13 +110,13 @@ def read(pieces: tuple[Piece, ...], size: int, view: View) -> bytes:
 
 
 def _registers(number: int, size: int, view: View) -> bytes:
-    """Return `size` bytes from Wn and the following registers."""
+    """Return `size` bytes from a register and the following ones."""
     data = b""
     while len(data) < size:
         value = view.register(number)
         if value is None:
-            raise Unavailable(f"W{number} of this frame is not known")
-        data += value.to_bytes(2, "little")
+            raise Unavailable(f"{view.register_name(number)} of this frame is not known")
+        data += value.to_bytes(view.register_size(number), "little")
         number += 1
     return data[:size]
 
@@ -121,12 +130,13 @@ def write(pieces: tuple[Piece, ...], data: bytes, view: View) -> None:
         elif piece.kind == "register":
             if piece.skip:  # the lower byte keeps its value
                 part = _registers(piece.at, 1, view) + part
-            for index in range(0, len(part), 2):
-                number = piece.at + index // 2
+            width = view.register_size(piece.at)
+            for index in range(0, len(part), width):
+                number = piece.at + index // width
                 old = view.register(number)
                 if old is None:
-                    raise Unavailable(f"W{number} of this frame is not known")
-                word = part[index : index + 2]
+                    raise Unavailable(f"{view.register_name(number)} of this frame is not known")
+                word = part[index : index + width]
                 view.set_register(number, int.from_bytes(word, "little") | (old & 0xFF00 if len(word) == 1 else 0))
         else:
             raise Unavailable("it has a value but no place")
@@ -225,9 +235,9 @@ class _Evaluation:
 
     def _based(self, number: int) -> int:
         offset = self._leb(True)
-        value = self.view.register(number)
+        value = self.view.address_in(number)
         if value is None:
-            raise Unavailable(f"W{number} of this frame is not known")
+            raise Unavailable(f"{self.view.register_name(number)} of this frame is not known")
         return value + offset
 
     def _leb(self, signed: bool) -> int:

@@ -7,7 +7,7 @@ information never makes a run fail. Addresses are PC units for code and bytes fo
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Final
 from weakref import WeakKeyDictionary
@@ -105,9 +105,9 @@ class Scope:
 
 
 class DebugInfo:
-    """Content of the debug sections of one image."""
+    """Content of an image's debug sections, given by name."""
 
-    def __init__(self, image: Image) -> None:
+    def __init__(self, named: Mapping[str, bytes]) -> None:
         self.functions: Final[list[Scope]] = []
         """Functions with code, sorted by address."""
         self.globals: Final[dict[str, list[Variable]]] = {}
@@ -118,7 +118,7 @@ class DebugInfo:
         """Complete types by name and compile unit: base types, typedefs, and tags such as `struct node`."""
         self.constants: Final[dict[str, int]] = {}
         """Enumerators by name."""
-        sections = remove_phantom_octets({s.name: s.octets for s in image.sections if s.name.startswith(".debug_")})
+        sections = remove_phantom_octets(named)
         if sections.get(".debug_info") and sections.get(".debug_abbrev"):
             _Reader(self, sections).read()
         self.functions.sort(key=lambda one: one.ranges[0])
@@ -147,7 +147,9 @@ def debug_of(image: Image) -> DebugInfo:
     """Return the debug information of `image`. The first call reads it."""
     found = _KNOWN.get(image)
     if found is None:
-        found = _KNOWN[image] = DebugInfo(image)
+        found = _KNOWN[image] = DebugInfo(
+            {one.name: one.octets for one in image.sections if one.name.startswith(".debug_")}
+        )
     return found
 
 

@@ -393,21 +393,25 @@ class _Parser:
             raise ExpressionError(f"{self.text!r}: '{text}' is no char")
         return TypedNumber(code - 256 if code >= 128 else code)
 
+    def _is_register(self, name: str) -> bool:
+        return name.upper() in self.inspector.processor.register_names
+
     def identifier(self, name: str) -> Any:
         inspector = self.inspector
         variable = inspector.variable(name, self.frame) if not name.startswith("$") else None
         if variable is not None:
             return inspector.value(variable, self.frame) if self.evaluates else self._placeholder(variable.type, name)
         bare = name.removeprefix("$")
-        register = re.fullmatch(r"[Ww](\d|1[0-5])", bare)
+        register = inspector.processor.register_names.index(bare.upper()) if self._is_register(bare) else None
         sfr = inspector.image.chip.sfrs.get(bare.removesuffix("bits"))
-        symbol = inspector.symbol(name) if not name.startswith("$") and not register and sfr is None else None
+        symbol = inspector.symbol(name) if not name.startswith("$") and register is None and sfr is None else None
         if symbol is not None:
             return symbol
         if name in inspector.debug.constants:
             return integer_constant(inspector.debug.constants[name], may_be_unsigned=True)
         if register is not None:
-            return Value(UNSIGNED[2], (Piece("register", int(register[1])),), inspector.view(self.frame), bare)
+            size = inspector.processor.register_size(register)
+            return Value(UNSIGNED[size], (Piece("register", register),), inspector.view(self.frame), bare)
         if sfr is not None:
             place = (Piece("memory", sfr.address),)
             return Value(UNSIGNED[sfr.size], place, inspector.view(self.frame), bare.removesuffix("bits"))

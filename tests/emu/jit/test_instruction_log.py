@@ -8,10 +8,10 @@ from pathlib import Path
 import pytest
 
 import emu
+from emu.debug.disassembly import instruction
 from emu.dspic30f.jit.engine import JitEngine
 from emu.image.loader import load_image
 from emu.image.model import Image
-from emu.instruments.disassembly import instruction
 from emu.instruments.trace import HEADER, SILENT, Tracer
 from emu.machine.machine import Machine
 from tests.emu.jit.comparison.random_firmware import load, random_firmware
