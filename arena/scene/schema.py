@@ -327,8 +327,8 @@ class ObjectKind(Placed):
     - `heading_deg`: rotation of a polygon at the start; nan: random
     - `floor_friction`: coefficient for an even pressure on the floor
     - `colour`: a name of `NAMED`, or red, green and blue as `#rrggbb`, as a camera shows them
-    - `share`: infrared reflection as a share of white paper's; an object lower than 2.5 cm reflects and blocks no
-      infrared light
+    - `share`: infrared reflection as a share of white paper's; an object lower than 2.5 cm neither reflects nor
+      blocks infrared light
     """
 
     radius_cm: float = dimensions.OBJECT_RADIUS
