@@ -6,8 +6,8 @@ import re
 from typing import Final
 
 from emu.prompt.client import CommandRefusedError
+from emu.prompt.command_table import command
 from emu.prompt.session import DebugSession
-from emu.prompt.table import command
 
 IF: Final = re.compile(r"(?:^|\s+)if\s+")
 

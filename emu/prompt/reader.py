@@ -10,9 +10,9 @@ from emu.host.exit_status import BAD_INPUT, DONE, FAULT
 from emu.host.paths import history
 from emu.prompt import breakpoint_commands, run_commands, state_commands  # noqa: F401  they fill the table
 from emu.prompt.client import Client, CommandRefusedError, DebugServer, Row
+from emu.prompt.command_table import TABLE, Command, find_command
 from emu.prompt.session import DebugSession
 from emu.prompt.state_commands import TOPICS
-from emu.prompt.table import TABLE, Command, find_command
 
 if TYPE_CHECKING:
     from prompt_toolkit import PromptSession

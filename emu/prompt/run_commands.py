@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from emu.prompt.client import CommandRefusedError
+from emu.prompt.command_table import command
 from emu.prompt.session import DebugSession
-from emu.prompt.table import command
 
 BY_INSTRUCTION = {"granularity": "instruction"}
 

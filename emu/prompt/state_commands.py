@@ -7,8 +7,8 @@ from typing import Final
 
 from emu.prompt import formatting
 from emu.prompt.client import CommandRefusedError
+from emu.prompt.command_table import TABLE, command, find_command
 from emu.prompt.session import LISTING_LINES, DebugSession
-from emu.prompt.table import TABLE, command, find_command
 
 FORMAT: Final = re.compile(r"/(\d*)([a-z]*)(?:\s+|$)(.*)", re.DOTALL)
 SIZES: Final = {"b": 1, "h": 2, "w": 4}

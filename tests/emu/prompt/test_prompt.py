@@ -19,9 +19,9 @@ import emu
 from emu.cli import main
 from emu.dap.server import Server
 from emu.debug.history import History
+from emu.prompt.command_table import TABLE
 from emu.prompt.reader import Prompt, candidates, execute
 from emu.prompt.state_commands import TOPICS
-from emu.prompt.table import TABLE
 from tests.emu.dap.test_dap import SOURCE, line_of
 from tests.watchdog import cpu_of
 from toolchain.driver import driver
