@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 from openswarm.cli import main
+from openswarm.commands.new import measure
 from tests.watchdog import HANG
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -23,6 +24,13 @@ def project(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("new") / "my-robot"
     assert main(["new", str(folder), "--no-baselines"]) == 0
     return folder
+
+
+def test_baselines_that_cannot_be_built_are_reported_in_one_line(tmp_path, capsys):
+    (tmp_path / "Makefile").write_text("baselines:\n\t@echo no compiler >&2; exit 3\n")
+    measure(tmp_path)
+    said = capsys.readouterr().err
+    assert said == "openswarm new: the baselines are missing; `make baselines` writes them: no compiler\n"
 
 
 def run_command(folder: Path, *words: str) -> subprocess.CompletedProcess[str]:

@@ -8,12 +8,14 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 from xml.etree import ElementTree
 
 import pytest
 import yaml
 
 from emu.host import paths
+from openswarm.testing.plugin import ROBOTS, pytest_runtest_makereport
 from tests.openswarm.conftest import shortened
 from tests.vcd_reader import VCDVCD
 
@@ -172,3 +174,14 @@ def test_the_action_s_steps_as_they_are_from_the_wheel(wheel, baselines, tmp_pat
     left = tmp_path / "robot" / "robot-artefacts"
     assert os.listdir(left)
     assert VCDVCD(str(next(left.glob("*/waves.vcd"))), only_sigs=True).signals
+
+
+@pytest.mark.parametrize(("when", "noted"), [("call", True), ("setup", False), ("teardown", False)])
+def test_the_report_of_a_call_has_the_cycles_of_each_robot(when: str, noted: bool) -> None:
+    """The hook adds the cycles of each robot to the properties of its test once, after the call."""
+    item = SimpleNamespace(stash={ROBOTS: [SimpleNamespace(cycle=5), SimpleNamespace(cycle=7)]}, user_properties=[])
+    hook = pytest_runtest_makereport(item, None)
+    next(hook)
+    with pytest.raises(StopIteration):
+        hook.send(SimpleNamespace(when=when, failed=False))
+    assert item.user_properties == ([("robot_cycles", 5), ("robot1_cycles", 7)] if noted else [])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import html
+import io
 import json
 import signal
 import subprocess
@@ -16,6 +17,7 @@ from contextlib import contextmanager
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -340,6 +342,13 @@ def test_bad_requests_are_reported_in_one_line(body: bytes, said: str) -> None:
         assert asked(one, "/inspect?robot=7")[0] == asked(one, "/more?from=-1&epoch=1")[0] == 409
         assert asked(one, "/elsewhere")[0] == 404
         assert json.loads(asked(one, "/inspect?robot=1")[1]) == {"robot": 1, "script": True}
+
+
+def test_a_long_request_is_refused_before_it_is_read() -> None:
+    """A body above 64 KiB is refused by its announced length."""
+    request = SimpleNamespace(headers={"Content-Length": "65537"}, rfile=io.BytesIO(b"{}"))
+    with pytest.raises(CommandRefusedError, match="request of 65537 bytes; expected at most 65536"):
+        command._StudioHandler._body(request)
 
 
 @pytest.mark.slow
