@@ -153,11 +153,12 @@ def test_robots_agree_on_a_mean(tmp_path: Path) -> None:
 
 
 def test_who_knows_the_answer_knows_that_all_is_done() -> None:
-    """A search is complete when a robot reports the right answer; wrong answers and robots that are off do not
-    count."""
+    """A search is complete when a robot reports the right answer; wrong answers, answers before all parts are done, and
+    robots that are off do not count."""
     lines = [UartLine(robot, 0.5, "done 8") for robot in range(5)] + [
         UartLine(0, 1.1, "best 52527"),
         UartLine(0, 1.1, "done 32"),
+        UartLine(1, 1.1, "best 52527"),
     ]
     lines += [UartLine(2, 2.6, f"best {best}") for best in (9, 52527)] + [
         UartLine(2, 2.6, "done 32"),
