@@ -118,6 +118,17 @@ class CallGraph:
         return [CallEdge(None if site == NOWHERE else site, *rest) for site, *rest in sorted(rows)]
 
     def events(self) -> Iterator[CallEvent]:
-        """Yield the call events in order."""
+        """Yield the call events in order. Adjacent parts of a sleep, which engines divide differently, are one."""
+        slept: CallEvent | None = None
         for part in self._parts:
-            yield from map(CallEvent._make, part.tolist())
+            for event in map(CallEvent._make, part.tolist()):
+                if slept is not None and event.what == SLEEP and event.cycle - event.length == slept.cycle:
+                    slept = event._replace(length=slept.length + event.length)
+                    continue
+                if slept is not None:
+                    yield slept
+                slept = event if event.what == SLEEP else None
+                if slept is None:
+                    yield event
+        if slept is not None:
+            yield slept

@@ -185,6 +185,21 @@ def test_entries_without_nesting_are_at_priority_7(nested):
     assert profiles[0].levels.keys() == {0, 7}
 
 
+def test_timelines_of_the_engines_are_equal(nested):
+    """T3 runs without an interrupt: its events divide a sleep in native code."""
+    timelines = []
+    for engine in ("plain", "jit"):
+        machine = Machine(nested.chip, engine=engine)
+        machine.load(nested)
+        machine.write("PR3", 20)
+        machine.write("T3CON", 0x8000)
+        if engine == "jit":
+            machine.runner.threshold = 1
+        timelines.append(list(Profiler(machine, nested, timed=True).run(20_000).events))
+    assert timelines[0] == timelines[1]
+    assert max(event.length for event in timelines[0]) > 21
+
+
 def test_inclusive_cycles_leave_out_interrupts_and_count_recursion_once(nested):
     profile = counted(nested, "jit", 200_000)
     named = {edge.entry: nested.symbols.text(edge.entry) for edge in profile.edges}
