@@ -300,7 +300,7 @@ class Machine(StateAccess):
 
         `until` names a function or label, or is a program address: the run ends with reason "until" when the PC next
         reaches it. It may also be a function, which is called after every instruction and therefore slow. Raises
-        KeyError for an unknown name, ValueError if both limits are given or a limit is negative or no number.
+        KeyError for an unknown name, ValueError if both limits are given or a limit is not above 0.
         """
         limit = self._limit_of(cycles, seconds)
         if until is None:
@@ -314,9 +314,11 @@ class Machine(StateAccess):
         if seconds is not None:
             if cycles is not None:
                 raise ValueError("give cycles or seconds, not both")
-            cycles = self.cycles_in(seconds) if seconds != 0 else 0
-        if cycles is not None and not (isinstance(cycles, Real) and 0 <= cycles < math.inf and cycles == int(cycles)):
-            raise ValueError(f"cycles = {cycles!r}: expected a whole number of 0 or more")
+            if seconds == 0:
+                raise ValueError(f"seconds = {seconds!r}: expected a number above 0")
+            cycles = self.cycles_in(seconds)
+        if cycles is not None and not (isinstance(cycles, Real) and 0 < cycles < math.inf and cycles == int(cycles)):
+            raise ValueError(f"cycles = {cycles!r}: expected a whole number above 0")
         return NEVER if cycles is None else self.cycle + int(cycles)
 
     def step_until(self, condition: Callable[[], bool], limit: int) -> Stop:
