@@ -15,7 +15,7 @@ from toolchain.bounds.annotations.flow_facts import (
     WAITS_FOR_INTERRUPT,
     FlowFacts,
 )
-from toolchain.bounds.contexts import AnalysisCache
+from toolchain.bounds.calling_contexts import AnalysisCache
 from toolchain.bounds.explorer import BudgetExceededError, Explorer
 from toolchain.bounds.program import Program
 from toolchain.bounds.result import FunctionResult

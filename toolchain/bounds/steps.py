@@ -8,7 +8,7 @@ from emu.dspic30f.isa.flow import Branch, Disi, Do, Flow, Repeat, Return, Skip, 
 from toolchain.bounds.abstract.state import INHERITED, LEVELS, AbstractState, widen
 from toolchain.bounds.abstract.values import extremes
 from toolchain.bounds.annotations.flow_facts import DO_LOOPS_TOO_DEEP, VARIABLE_FRAME
-from toolchain.bounds.contexts import CallContexts
+from toolchain.bounds.calling_contexts import CallContexts
 from toolchain.bounds.graph import FunctionGraph, Instruction
 from toolchain.bounds.result import FunctionResult
 from toolchain.bounds.transfer import is_constant

@@ -24,8 +24,8 @@ import z3
 from toolchain.abi.target import SP
 from toolchain.ir.cfg import predecessors, reverse_postorder
 from toolchain.ir.model import Function
-from toolchain.proof.code.execution import CodeExecution
-from toolchain.proof.code.machine import MachineState
+from toolchain.proof.machine_code.execution import CodeExecution
+from toolchain.proof.machine_code.machine import MachineState
 from toolchain.proof.invariants import Invariant, OrderInvariant, candidate_invariants, candidate_orders, words_of
 from toolchain.proof.ir.evaluator import Evaluator
 from toolchain.proof.memory import BYTE, StackFrame, SymbolicMemory, bytes_of, concat

@@ -19,8 +19,8 @@ from toolchain.abi.names import symbol
 from toolchain.abi.target import RETURN_ADDRESS_BYTES
 from toolchain.ir.cfg import loop_depths
 from toolchain.ir.model import Arg, ConstInt, Function, Instr, Type, size_of
-from toolchain.proof.code.execution import CodeExecution
-from toolchain.proof.code.machine import MachineState
+from toolchain.proof.machine_code.execution import CodeExecution
+from toolchain.proof.machine_code.machine import MachineState
 from toolchain.proof.counterexample import Counterexample, counterexample_of
 from toolchain.proof.ir.accesses import Accesses
 from toolchain.proof.ir.evaluator import Evaluator

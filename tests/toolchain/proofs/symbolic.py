@@ -13,7 +13,7 @@ from typing import Any
 import z3
 
 from emu.dspic30f.isa import codec, flow
-from toolchain.proof.code.machine import MachineState, SymbolicMachine
+from toolchain.proof.machine_code.machine import MachineState, SymbolicMachine
 from toolchain.proof.memory import STACK, StackFrame, SymbolicMemory
 from toolchain.proof.solver import feasible
 from toolchain.proof.terms import BITS, SymbolicInteger, holds, narrow, vector, wide

@@ -10,7 +10,7 @@ from typing import Final
 
 import z3
 
-from toolchain.proof.helpers import opaque
+from toolchain.proof.runtime_models import opaque
 from toolchain.proof.solver import Undecided
 from toolchain.proof.terms import Term, one_bit, vector
 

@@ -8,7 +8,7 @@ from typing import Any, Final
 import z3
 
 from toolchain.ir.model import Instr
-from toolchain.proof.helpers import bits_set
+from toolchain.proof.runtime_models import bits_set
 from toolchain.proof.ir import floats
 from toolchain.proof.ir.effects import Effects
 from toolchain.proof.path import Path

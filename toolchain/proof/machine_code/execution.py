@@ -10,8 +10,8 @@ import z3
 from emu.dspic30f.isa import flow
 from emu.dspic30f.isa.rows.multiply import DIVIDE_COUNT
 from toolchain.abi.target import RETURN_ADDRESS_BYTES, SP
-from toolchain.proof.code.calling_convention import ConventionChecker
-from toolchain.proof.code.machine import MachineState, SymbolicMachine
+from toolchain.proof.machine_code.calling_convention import ConventionChecker
+from toolchain.proof.machine_code.machine import MachineState, SymbolicMachine
 from toolchain.proof.memory import StackFrame
 from toolchain.proof.path import Path
 from toolchain.proof.problem import PAGE, WORD_UNITS, CompiledFile
