@@ -23,8 +23,8 @@ from toolchain.bounds.annotations.flow_facts import (
     STACK_GROWS,
     UNBOUNDED_LOOP,
 )
-from toolchain.bounds.calls import CallExecution
 from toolchain.bounds.calling_contexts import CallContexts
+from toolchain.bounds.calls import CallExecution
 from toolchain.bounds.graph import BasicBlock, FunctionGraph, Instruction, Loop, OrderElement
 from toolchain.bounds.result import FunctionResult, Scope
 from toolchain.bounds.transfer import is_constant

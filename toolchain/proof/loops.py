@@ -24,10 +24,10 @@ import z3
 from toolchain.abi.target import SP
 from toolchain.ir.cfg import predecessors, reverse_postorder
 from toolchain.ir.model import Function
-from toolchain.proof.machine_code.execution import CodeExecution
-from toolchain.proof.machine_code.machine import MachineState
 from toolchain.proof.invariants import Invariant, OrderInvariant, candidate_invariants, candidate_orders, words_of
 from toolchain.proof.ir.evaluator import Evaluator
+from toolchain.proof.machine_code.execution import CodeExecution
+from toolchain.proof.machine_code.machine import MachineState
 from toolchain.proof.memory import BYTE, StackFrame, SymbolicMemory, bytes_of, concat
 from toolchain.proof.path import Path
 from toolchain.proof.problem import WORD_UNITS, CompiledFile

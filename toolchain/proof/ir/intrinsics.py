@@ -8,10 +8,10 @@ from typing import Any, Final
 import z3
 
 from toolchain.ir.model import Instr
-from toolchain.proof.runtime_models import bits_set
 from toolchain.proof.ir import floats
 from toolchain.proof.ir.effects import Effects
 from toolchain.proof.path import Path
+from toolchain.proof.runtime_models import bits_set
 from toolchain.proof.solver import Undecided
 from toolchain.proof.terms import Term, constant_value, one_bit, truth, vector
 

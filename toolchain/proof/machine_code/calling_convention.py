@@ -15,10 +15,10 @@ from toolchain.abi.arguments import argument_locations
 from toolchain.abi.target import CALLEE_SAVED, CALLER_SAVED, RAM_END, RETURN_ADDRESS_BYTES, SP
 from toolchain.proof.asm_statements import Statement
 from toolchain.proof.machine_code.machine import ACCUMULATORS, CORE, PSVPAG, MachineState, SymbolicMachine
-from toolchain.proof.runtime_models import HELPERS, Helper
 from toolchain.proof.memory import STACK, StackFrame, SymbolicMemory, bytes_of, concat
 from toolchain.proof.path import Event, Path
 from toolchain.proof.problem import CompiledFile
+from toolchain.proof.runtime_models import HELPERS, Helper
 from toolchain.proof.solver import Refuted, Undecided, check, require
 from toolchain.proof.terms import Term, constant_value, narrow, vector, wide, word
 from toolchain.select.calls import shape_of
