@@ -140,8 +140,11 @@ class Compiler:
         blob = self.cache.get(key)
         if blob is None:
             return None
+        try:
+            entries, code = unpack_object(blob)
+        except (struct.error, zlib.error):  # by a process that ran while its sources were changed
+            return None
         self.statistics.from_disk += 1
-        entries, code = unpack_object(blob)
         return self.load(code, key, entries)
 
     def compile_now(self, text: str, level: int, key: str, entries: Sequence[int] = ()) -> LoadedCode:

@@ -240,6 +240,14 @@ def test_objects_are_compressed() -> None:
     assert unpack_object(packed) == ([0x100, 0x8000], code)
 
 
+@pytest.mark.parametrize("stored", [b"", b"\x01\0\0\0", b"\0\0\0\0\x7fELF"])
+def test_an_object_of_another_form_is_compiled_again(stored: bytes, compiler: Compiler) -> None:
+    """A process whose sources change while it runs may store objects that a later process does not understand."""
+    compiler.cache.put("a", stored)
+    assert compiler.lookup("a") is None
+    assert compiler.compile_now(IR.format(1), 0, "a").address
+
+
 def test_the_folder_keeps_what_was_used_last(tmp_path: Path) -> None:
     """A shelf of the cache with room for ten objects of about 1,000 bytes keeps the objects that were used last."""
     cache = ObjectCache(tmp_path, limit=10_000 * SHELVES)
