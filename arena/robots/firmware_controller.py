@@ -189,6 +189,7 @@ class FirmwareController:
         """Take poses from `poses_at` from now on, when the firmware observes the world, not from `control_step`."""
         self._poses_at = poses_at
         self._ring.poses_source = self._begin_sensing
+        self.machine.peripherals.adc.inputs_come_later = True
 
     def use_native_runner(self, run_native: NativeRunner) -> None:
         """Run native code by `run_native` from now on, if the machine has native code."""

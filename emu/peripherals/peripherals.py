@@ -195,8 +195,12 @@ class Peripherals:
             uart.deliver_sent()
 
     def synchronize(self) -> None:
-        """Bring all lazily computed state to the present, so that the record does not depend on earlier reads."""
-        self.adc.synchronize()
+        """Bring all lazily computed state to the present, so that the record does not depend on earlier reads.
+
+        Conversions whose inputs come later stay as they are: only the program waits for those.
+        """
+        if not self.adc.inputs_come_later:
+            self.adc.synchronize()
         for port in range(len(PORTS)):
             self.pins.invalidate(port)
         for listener in self.on_synchronize:

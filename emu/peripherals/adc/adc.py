@@ -83,6 +83,8 @@ class Adc(Peripheral):
         self._published: Final = PublishedSettings(self, CHANNELS)
         self._vref_high: Final = self.cell("vref_high", "I", FULL_SCALE)
         self._vref_low: Final = self.cell("vref_low", "I", 0)
+        self.inputs_come_later = False
+        """Whether inputs of past cycles may be unknown, because the world around the robot follows later."""
         self._state: Final = self.cell("state", "B")
         self._mark: Final = self.timestamp("mark")
         """Start of the current state, in cycles; `half` adds half a Tcy."""
