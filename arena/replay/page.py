@@ -70,8 +70,12 @@ def trial_data(trial: Trial) -> dict[str, Any]:
         "polygon": trial.scene.arena.polygon,
         "walls": trial.scene.arena.walls,
         "kinds": [
-            {"name": one.name, "radius": one.radius_cm, "colour": _css(one.colour),
-             "polygon": geometry.centred(one.polygon) if one.polygon else ()}
+            {
+                "name": one.name,
+                "radius": one.radius_cm,
+                "colour": _css(one.colour),
+                "polygon": geometry.centred(one.polygon) if one.polygon else (),
+            }
             for one in map(trial.scene.kind_of, range(trial.scene.objects.count))
         ],
         "grouped": trial.experiment.has_groups,

@@ -17,9 +17,7 @@ class PcHooks:
         self.by_address: Final[dict[int, list[PcHook]]] = {}
         self.filters: Final[dict[int, list[Filter | None]]] = {}
 
-    def add(
-        self, address: int, hook: PcHook, when: Filter | None, on_change: Callable[[], None]
-    ) -> Callable[[], None]:
+    def add(self, address: int, hook: PcHook, when: Filter | None, on_change: Callable[[], None]) -> Callable[[], None]:
         """Add a hook and return a function that removes it. `on_change` is called after addition and removal."""
         self.by_address.setdefault(address, []).append(hook)
         self.filters.setdefault(address, []).append(when)

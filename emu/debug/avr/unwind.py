@@ -61,9 +61,7 @@ class AvrUnwinder:
         self._entries: Final = _frame_entries(sections)
         self._starts: Final = [start for start, _, _ in self._entries]
 
-    def frames(
-        self, pc: int, registers: Registers, function_start: Callable[[int], int | None]
-    ) -> list[RawFrame]:
+    def frames(self, pc: int, registers: Registers, function_start: Callable[[int], int | None]) -> list[RawFrame]:
         """Return the frames, innermost first, for a PC and register values."""
         frames: list[RawFrame] = []
         is_exact = True
