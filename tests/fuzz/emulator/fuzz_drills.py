@@ -17,7 +17,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[3]
 sys.path.insert(0, str(ROOT))
 
-from tests.emu.peripherals.drills.access_census import WAYS, modes_of  # noqa: E402
+from tests.emu.peripherals.drills.access_census import ACCESS_MODES, modes_of  # noqa: E402
 from tests.emu.peripherals.drills.device_drills import registers_of  # noqa: E402
 from tests.emu.peripherals.drills.device_programs import CHIPS  # noqa: E402
 from tests.emu.peripherals.drills.drill_runs import Tally, check  # noqa: E402
@@ -59,7 +59,7 @@ def never(tally: Tally, chip: str) -> dict[tuple[str, int, str], list[str]]:
         (kind, size, way): [sfr.name for sfr in registers_of(chip) if not made[chip, sfr.address, write, size, way]]
         for kind, write in (("read", False), ("write", True))
         for size in (1, 2)
-        for way in WAYS
+        for way in ACCESS_MODES
     }
 
 
