@@ -162,7 +162,7 @@ def _cfa(rule: CFARule, registers: dict[int, int]) -> int:
     """Return the value of a CFA rule: register and offset, or an expression (a push under REPEAT)."""
     if rule.expr is None:
         return registers[rule.reg] + rule.offset & 0xFFFF
-    view = SimpleNamespace(register=registers.get)
+    view = SimpleNamespace(register=registers.get, address_in=registers.get)
     return pieces_of(bytes(rule.expr), view, lambda: 0)[0].at & 0xFFFF
 
 
