@@ -294,11 +294,8 @@ class JitEngine:
         return False
 
     def _sample(self, cycles: int) -> None:
-        """Count the Tcy of a native run that has just ended, and compile its region again if it is hot.
-
-        Runs that end asleep do not count: native code skips the time of Idle and Sleep.
-        """
-        self._unsampled = self._unsampled + cycles if self._u16[self._mode] == RUN else 0
+        """Count the Tcy of a native run that has just ended, and compile its region again if it is hot."""
+        self._unsampled += cycles
         if self._unsampled >= SAMPLE_CYCLES and self._code is not None and self._counting is None:
             region = self._code.hot.sample(self._u32[self._pc], self._unsampled)
             self._unsampled = 0

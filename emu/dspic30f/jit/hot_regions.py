@@ -1,7 +1,8 @@
 """Regions that have run so long that compiling them again, with all of LLVM's passes, pays.
 
 Native code is not instrumented for this. Where a native run ends is a sample: its length counts for the region of that
-address, unless the CPU sleeps there. The first code of a region comes from a short list of passes (`worker.py`).
+address. Runs that end asleep count too: the region with the Idle instruction often has the code that runs after each
+interrupt. The first code of a region comes from a short list of passes (`worker.py`).
 """
 
 from __future__ import annotations
