@@ -8,6 +8,7 @@ a line differs in more than its speed.
 
 from __future__ import annotations
 
+import argparse
 import difflib
 import re
 import subprocess
@@ -56,9 +57,12 @@ def run_session(block: str) -> str:
 
 
 def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--check", action="store_true", help="compare the page with the output, write nothing")
+    options = parser.parse_args()
     text = PAGE.read_text(encoding="utf-8")
     fresh = re.sub(r"(?<=```\n)(\$ .*?)(?=```)", lambda found: run_session(found[1]), text, flags=re.DOTALL)
-    if "--check" not in sys.argv[1:]:
+    if not options.check:
         PAGE.write_text(fresh, encoding="utf-8")
         return 0
     was, now = (SPEED.sub("x real time", one).splitlines() for one in (text, fresh))

@@ -13,7 +13,7 @@ from emu.boards.epuck.camera.camera import Camera
 from emu.boards.epuck.camera.pixels import line_code
 
 from ..conftest import Robot
-from .test_camera import po3030, po6030, scene
+from .camera_driver import po3030, po6030, scene
 
 DARK = [(0, 0xD4, 0x2C)]
 """Register writes for manual exposure of a PO3030K."""
