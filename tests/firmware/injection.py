@@ -47,7 +47,7 @@ COMPARED = (*(f"W{n}" for n in range(15)), "RCOUNT", "TBLPAG", "PSVPAG", "CORCON
 ALL = 0xFFFF
 """Value of isr_wanted: the interrupt makes every permitted and every forbidden call."""
 
-WAYS = ("together", "nested")
+MODES = ("together", "nested")
 """Injection modes.
 
 together: all interrupts at the boundary. nested: the slice ends at the boundary, the others follow up to 44
@@ -187,7 +187,7 @@ class Stage:
 def sweep(
     path: Path,
     ipl_slip: int,
-    way: str,
+    mode: str,
     stride: int = 1,
     phase: int = 0,
     first: int = 0,
@@ -208,9 +208,9 @@ def sweep(
             if stage.in_kernel():
                 if number % stride == 0:
                     here = machine.snapshot()
-                    where = f"scene {scene}, boundary {number} at {machine.pc:#x}, {way}, slip {ipl_slip}"
+                    where = f"scene {scene}, boundary {number} at {machine.pc:#x}, {mode}, slip {ipl_slip}"
                     try:
-                        _inject(stage, base, number * 7 % 45 if way == "nested" else 0, stage.calls_of(number))
+                        _inject(stage, base, number * 7 % 45 if mode == "nested" else 0, stage.calls_of(number))
                     except AssertionError as error:
                         raise AssertionError(f"{where}: {error}") from error
                     machine.restore(here)

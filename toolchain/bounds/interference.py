@@ -71,7 +71,7 @@ class BoundsReport:
                 highest[place] = max(level, highest.get(place, 0))
         stopped = {row.clock_stopped_at: CLOCK_STOPPED for row in self.rows if row.clock_stopped_at}
         return stopped | {
-            place: f"an endless loop in which levels up to {level} are held back" for place, level in highest.items()
+            place: f"an endless loop in which levels up to {level} are masked" for place, level in highest.items()
         }
 
     @property

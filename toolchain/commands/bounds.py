@@ -113,12 +113,12 @@ def as_text(report: BoundsReport, program: Program) -> str:
     """Return the report as tables."""
     rows = report.rows
     width = max((len(row.name) for row in rows), default=8)
-    lines = [f"{'':9} {'':{width}}   cycles  stack  held back: level 1    4    5    6  deepest path"]
+    lines = [f"{'':9} {'':{width}}   cycles  stack     masked: level 1    4    5    6  deepest path"]
     lines += [_row(row, width) for row in rows]
     if SECOND_STACK in report.stacks:
         lines.append(f"{'stack':9} {SECOND_STACK:{width}} {'':8} {_number(report.stacks[SECOND_STACK]):>6}")
     if report.responses:
-        lines += ["", f"{'interrupt':{width}}  level  held back  response  by"]
+        lines += ["", f"{'interrupt':{width}}  level     masked  response  by"]
         lines += [
             f"{one.name:{width}}  {one.level:5}  {_number(one.masked):>9}  {_number(one.cycles):>8}  {one.where}"
             for one in report.responses

@@ -59,7 +59,7 @@ TIMER_LOOP = """
     bra @repeat
 """
 MARK, AFTER = (assembled(TIMER_LOOP)[1][name] for name in ("mark", "after"))
-WAYS = ("plain", "jit, cold", "jit, warm")
+ENGINES_AND_CACHES = ("plain", "jit, cold", "jit, warm")
 
 IDLE_WITH_TIMER = """
     mov #0x8000, w0
@@ -80,7 +80,7 @@ IDLE_WITH_TIMER = """
 """
 
 
-@pytest.fixture(params=WAYS)
+@pytest.fixture(params=ENGINES_AND_CACHES)
 def machine(request: pytest.FixtureRequest, tmp_path: Path) -> Machine:
     """Return a machine with the timer loop in each engine; the native engine is tested with and without code."""
     path = tmp_path / "loop.elf"

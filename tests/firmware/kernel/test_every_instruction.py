@@ -8,7 +8,7 @@ import pytest
 
 from tests.firmware.conftest import TARGET_APPS, Build
 from tests.firmware.contracts import legal_in_interrupts, refused_in_interrupts
-from tests.firmware.injection import LEFT, MASKED, WAYS, fail_every_allocation, sweep
+from tests.firmware.injection import LEFT, MASKED, MODES, fail_every_allocation, sweep
 from tests.firmware.kernel.test_kernel_on_target import load, place
 from tests.fuzz.seeds import base_seed
 
@@ -16,8 +16,8 @@ STRIDE = 211
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("way", WAYS)
-def test_interrupts_at_every_instruction_change_nothing(image: Build, way: str) -> None:
+@pytest.mark.parametrize("mode", MODES)
+def test_interrupts_at_every_instruction_change_nothing(image: Build, mode: str) -> None:
     """Interrupts injected into every kernel call lose no register, message or memory.
 
     The interrupts are the tick, UART, stepper, an IPL 6 interrupt and a 100 us device that makes every call. The
@@ -25,9 +25,9 @@ def test_interrupts_at_every_instruction_change_nothing(image: Build, way: str) 
     tests/fuzz/kernel/fuzz_kernel.py runs all. Sources: kernel.md §4 `--ipl-slip`; bugs 7, 12, 13 of
     openswarm-original.md §7.
     """
-    ipl_slip = (base_seed() + WAYS.index(way)) % 2
-    phase = (base_seed() + 106 * WAYS.index(way)) % STRIDE  # a failure message names its boundary
-    *_, (scenes, seen) = sweep(image("calls", TARGET_APPS), ipl_slip, way, STRIDE, phase)
+    ipl_slip = (base_seed() + MODES.index(mode)) % 2
+    phase = (base_seed() + 106 * MODES.index(mode)) % STRIDE  # a failure message names its boundary
+    *_, (scenes, seen) = sweep(image("calls", TARGET_APPS), ipl_slip, mode, STRIDE, phase)
     assert scenes == 9
     assert seen.boundaries > 60
     assert seen.compared > seen.boundaries

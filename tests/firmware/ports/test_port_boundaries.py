@@ -53,7 +53,7 @@ Source: ARMv7-M architecture reference manual, B3; QEMU 7.2, hw/rtc/goldfish_rtc
 KERNEL_CODE = re.compile(r"/openswarm/(kernel|option|port)/")
 INT0, SLICE = 1, 14
 """Vector numbers of the ATmega328P: INT0 (device) and timer 0 compare A (end of the slice)."""
-WAYS = ("device", "slice", "nested")
+MODES = ("device", "slice", "nested")
 """Injection modes: the device; the end of the slice; the end of the slice and, up to 44 instructions later, the
 device."""
 PRIME = 97
@@ -75,7 +75,7 @@ def round_length(machine: Kilobot) -> int:
     return machine.instructions - begin
 
 
-def sweep(machine: Kilobot, way: str, stride: int) -> int:
+def sweep(machine: Kilobot, mode: str, stride: int) -> int:
     """Inject one interrupt per round, each `stride` instructions later than the last; return the number of rounds."""
     length = round_length(machine)
     rounds = 0
@@ -83,17 +83,17 @@ def sweep(machine: Kilobot, way: str, stride: int) -> int:
         machine.run_to("round_begin")
         machine.steps(boundary)
         before = peek(machine, "interrupts")
-        if way != "device":
+        if mode != "device":
             machine.interrupt(SLICE)
-        if way == "nested":
+        if mode == "nested":
             machine.steps(boundary * 7 % 45)
-        if way != "slice":
+        if mode != "slice":
             machine.interrupt(INT0)
         machine.run_to("round_begin")
         rounds += 1
-        where = f"{way}, boundary {boundary} of {length}"
+        where = f"{mode}, boundary {boundary} of {length}"
         check(machine, where)
-        assert peek(machine, "interrupts") - before == (way != "slice"), f"{where}: the interrupt was lost"
+        assert peek(machine, "interrupts") - before == (mode != "slice"), f"{where}: the interrupt was lost"
     return rounds
 
 
@@ -104,8 +104,8 @@ def test_the_kilobot_is_interrupted_everywhere(tmp_path: Path) -> None:
     Each mode starts at another offset, because rounds shift against the clock.
     """
     image = make("kilobot", "boundaries", tmp_path, apps=TARGET_APPS)
-    for way in WAYS:
-        assert sweep(kilobot(image), way, PRIME) > 50
+    for mode in MODES:
+        assert sweep(kilobot(image), mode, PRIME) > 50
 
 
 def kernel_instructions(target: str, image: Path) -> list[int]:
@@ -122,7 +122,7 @@ def kernel_instructions(target: str, image: Path) -> list[int]:
     return sorted(at for at in places if any(start <= at < start + size for start, size in spans))
 
 
-def sweep_in_qemu(target: str, image: Path, way: str, stride: int, phase: int, times: int) -> int:
+def sweep_in_qemu(target: str, image: Path, mode: str, stride: int, phase: int, times: int) -> int:
     """Inject one interrupt per round at the times-th execution of every stride-th kernel instruction.
 
     Return the number of injected interrupts; an instruction that executes less often gets none.
@@ -139,21 +139,21 @@ def sweep_in_qemu(target: str, image: Path, way: str, stride: int, phase: int, t
             if come < times:
                 continue
             before = peek(machine, "interrupts")
-            if way != "device":
+            if mode != "device":
                 machine.store(*INJECTIONS[target].slice)
-            for _ in range(number * 7 % 45 if way == "nested" else 0):
+            for _ in range(number * 7 % 45 if mode == "nested" else 0):
                 if machine.pc not in idle:  # WFI would not end while the clock is stopped
                     machine.step()
-            if way != "slice":
+            if mode != "slice":
                 machine.store(*INJECTIONS[target].device)
-            where = f"{way}, {place:#x} the {times}. time"
+            where = f"{mode}, {place:#x} the {times}. time"
             try:
                 machine.run_to("round_begin")
             except Stopped as stopped:
                 raise AssertionError(f"{where}: {stopped}") from None
             tried += 1
             check(machine, where)
-            assert peek(machine, "interrupts") - before == (way != "slice"), f"{where}: the interrupt was lost"
+            assert peek(machine, "interrupts") - before == (mode != "slice"), f"{where}: the interrupt was lost"
     return tried
 
 
@@ -165,8 +165,8 @@ def test_a_cpu_in_qemu_is_interrupted_everywhere(target: str, tmp_path: Path) ->
     They include instructions within IT blocks and under every mask.
     """
     image = make(target, "boundaries", tmp_path, apps=TARGET_APPS)
-    for way in WAYS:
-        assert sweep_in_qemu(target, image, way, PRIME, 13 * WAYS.index(way), 1) > 10
+    for mode in MODES:
+        assert sweep_in_qemu(target, image, mode, PRIME, 13 * MODES.index(mode), 1) > 10
 
 
 def main() -> int:
@@ -182,12 +182,12 @@ def main() -> int:
         except pytest.skip.Exception as missing:
             print(missing, file=sys.stderr)
             return 2
-        for way in WAYS:
+        for mode in MODES:
             if options.robot == "kilobot":
-                tried = sweep(Kilobot(image), way, options.stride)
+                tried = sweep(Kilobot(image), mode, options.stride)
             else:
-                tried = sweep_in_qemu(options.robot, image, way, options.stride, options.phase, options.times)
-            print(f"{way}: {tried:,} boundaries, nothing lost", flush=True)
+                tried = sweep_in_qemu(options.robot, image, mode, options.stride, options.phase, options.times)
+            print(f"{mode}: {tried:,} boundaries, nothing lost", flush=True)
     return 0
 
 

@@ -19,7 +19,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[3]
 sys.path.insert(0, str(ROOT))
 
-from tests.firmware.injection import WAYS, fail_every_allocation, sweep  # noqa: E402
+from tests.firmware.injection import MODES, fail_every_allocation, sweep  # noqa: E402
 from tests.firmware.kernel.test_kernel_on_target import load, place  # noqa: E402
 from tests.fuzz.seeds import Campaign, parser  # noqa: E402
 
@@ -66,11 +66,11 @@ def main() -> int:
         calls, registers = (build(app, Path(folder)) for app in ("calls", "registers"))
         try:
             for seed in campaign:
-                way, slip = WAYS[seed // 2 % len(WAYS)], seed % 2
-                for done, seen in sweep(calls, slip, way, stride, seed % stride, options.scene):
+                mode, slip = MODES[seed // 2 % len(MODES)], seed % 2
+                for done, seen in sweep(calls, slip, mode, stride, seed % stride, options.scene):
                     if options.seconds is None:
-                        print(f"--seed {seed} --scene {done} ({way}, slip {slip}): {seen}", flush=True)
-                print(f"{way}, slip {slip}: {seen}", flush=True)
+                        print(f"--seed {seed} --scene {done} ({mode}, slip {slip}): {seen}", flush=True)
+                print(f"{mode}, slip {slip}: {seen}", flush=True)
             if options.seconds is None:
                 for done, failures in fail_every_allocation(calls):
                     print(f"{failures} allocations failed in {done} scenes, nothing lost or leaked", flush=True)

@@ -129,7 +129,7 @@ def test_code_that_masks_interrupts_for_ever_has_no_response_bound(tmp_path: Pat
     report = analyse(image)
     assert {one.name: one.cycles is None for one in report.responses} == {"_T1Interrupt": True, "_T2Interrupt": False}
     assert main(["bounds", str(image)]) == 0
-    assert "p.s:6 (_main+0x6): an endless loop in which levels up to 4 are held back" in capsys.readouterr().out
+    assert "p.s:6 (_main+0x6): an endless loop in which levels up to 4 are masked" in capsys.readouterr().out
 
 
 def test_a_round_of_an_endless_loop_that_may_stay_masked(tmp_path: Path) -> None:

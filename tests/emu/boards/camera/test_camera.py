@@ -14,8 +14,6 @@ from emu.peripherals.timers.rules import write_ton
 from ..conftest import Robot
 from .camera_driver import capture, po3030, po6030, rgb565, scene
 
-FCY = 14_745_600
-
 
 def test_openswarm_window_is_captured_pixel_by_pixel():
     """§7.5: for a window of 160 x 160, centred, with zoom 8, the sensor sends QQVGA, and software takes every second

@@ -13,8 +13,6 @@ from emu.boards.epuck.camera.pixels import Gains, decode, encode
 from ..conftest import Robot
 from .camera_driver import capture, po3030, po6030, rgb565, scene
 
-FCY = 14_745_600
-
 
 def test_mirrors_turn_the_picture():
     """§7.1: PO6030K is mounted upside down, so without the mirror bits the picture is turned by 180 degrees."""
