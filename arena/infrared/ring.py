@@ -117,12 +117,19 @@ class InfraredRing:
         self._emission = Emission(channel.emitter(robot).address, addressof(channel.receivers), on_at)
         board.ir.emit_natively(watchers, address_of(code["emit"]), addressof(self._emission))
 
-    def begin_quantum(self, poses: Poses) -> None:
-        """Begin a quantum with `poses`. Conversions that sampled before it use the values before it."""
-        self._poses, begin = poses, self._adc.now + 1
+    def begin_quantum(self, poses: Poses, before: Poses) -> None:
+        """Begin a quantum with `poses`. Conversions that sampled before it use the values before it.
+
+        `before` are the poses of the finished quantum.
+        """
         if not self.is_read:
+            self._poses = poses
             return
-        since, sensing = self._adc.samples_from, self._sensing
+        begin, since, sensing = self._adc.now + 1, self._adc.samples_from, self._sensing
+        if since is not None and sensing.is_stale:  # it may have sampled in the finished quantum
+            self._poses = before
+            self._sense(sensing.begin)
+        self._poses = poses
         if since is not None and since < sensing.begin:
             self._adc.catch_up(begin - 1)
             since = self._adc.samples_from

@@ -292,7 +292,7 @@ class FirmwareController:
         """Begin a quantum with `poses`; `before` are the poses one quantum earlier."""
         self._poses_tick, self._start = tick, tick * self._quantum - self._on_at
         self._poses, self._before = poses, before if self._end_of(tick - 1) > 0 else poses
-        self._ring.begin_quantum(poses)
+        self._ring.begin_quantum(poses, self._before)
 
     def _begin_sensing(self) -> Poses:
         """Return the poses of the quantum in which the firmware reads its infrared sensors.

@@ -263,7 +263,7 @@ def lit_of_frames(scene: Scene, seed: int, share: float) -> list[list[int]]:
             if bit != before:
                 channel.switch(1, start + 3 * scan * place, 2, bit == "1")
         board.ir.events.now = now = start + channel.delay
-        ring.begin_quantum(poses)
+        ring.begin_quantum(poses, poses)
         board.ir._level(0, now)
         times = range(now, now + 3 * scan * len(frame), scan)
         seen = [light_code()["light"](addressof(ring._light), 2, cycle + scan // 2) > 10 for cycle in times]
@@ -329,7 +329,7 @@ def test_native_light_equals_the_reference_to_the_bit(scene: Scene) -> None:
         last = max(cycles[-1] for cycles, _ in tracks.values())
         channel.horizon = last - 200_000
         board.ir.events.now = now = last - 100_000
-        ring.begin_quantum(poses)
+        ring.begin_quantum(poses, poses)
         board.ir._level(0, now - 4000)
         seen, light = {one.robot: one for one in Optics(scene).signals(poses, 0, [1, 2, 3])}, light_code()["light"]
         setting = ring._light

@@ -18,6 +18,7 @@ from arena.lockstep.scheduler import LockStep
 from arena.robots.firmware_controller import FirmwareController
 from arena.scene.loader import Scene, load_scene
 from arena.world.physics import World
+from arena.world.poses import Poses
 from emu.boards.epuck.analog import RESPONSE, Infrared, reflection_at
 from emu.boards.epuck.board import Epuck
 from emu.chips.dspic30f6014a import DSPIC30F6014A
@@ -220,3 +221,33 @@ def test_rare_conversions_read_the_present_surfaces(
         assert seen == expected
     assert expected[0][4].infrared != expected[-2][4].infrared
     assert calls["begin_quantum"] < 0.5 * in_python["begin_quantum"]
+
+
+def test_a_conversion_read_in_the_next_quantum_sampled_the_surfaces_of_its_own(
+    assembled: Callable[[str], Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A conversion that samples in one quantum and is read in the next has the result of one that is computed in its
+    own quantum, though no conversion of the quanta before it was computed."""
+    scene = load_scene("clustering").with_values(
+        robots__count=2, objects__count=0, start__spread_tcy=1,
+        start__robot_poses=[[5.0, 150, 17], [12.0, 150, 40]],
+    )  # fmt: skip
+    polling, begins = "2:      btss    ADCON1, #0\n        bra     2b\n", "1:      mov "
+    assert polling in SELDOM
+    # So the second conversion samples before the end of quantum 24 and ends, by its event, after it.
+    late = SELDOM.replace(begins, f"        repeat  #12700\n        nop\n{begins}")
+    image = assembled(late.replace(polling, "        repeat  #1500\n        nop\n"))
+    step = FirmwareController.control_step
+
+    def computed_at_once(robot: FirmwareController, tick: int, poses: Poses) -> tuple[float, float]:
+        speeds = step(robot, tick, poses)
+        robot.machine.peripherals.adc.catch_up(robot.machine.cycle)
+        return speeds
+
+    late, _ = run(scene, image, "stepwise", monkeypatch)
+    native, _ = run(scene, image, "native", monkeypatch)
+    monkeypatch.setattr(FirmwareController, "control_step", computed_at_once)
+    at_once, _ = run(scene, image, "stepwise", monkeypatch)
+    assert late == at_once
+    assert native == at_once
+    assert at_once[0][4].infrared != at_once[-2][4].infrared
