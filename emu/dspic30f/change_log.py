@@ -1,8 +1,9 @@
 """Log of changes of watched numbers: cycle, place in the program, number and new value of each change.
 
 Input: a connected core and what to watch. Output: entries for a consumer, in order. A change is seen after the
-instruction or at the boundary that makes it. For code that the sequencer runs, this module wraps the sequencer. Native
-code appends to the same memory (jit/counters/change_counter.py). Replayed cycles and diagnosis are not logged.
+instruction or at the boundary that makes it, and a change by a hook before the hooked instruction. For code that the
+sequencer runs, this module wraps the sequencer. Native code appends to the same memory
+(jit/counters/change_counter.py). Replayed cycles and diagnosis are not logged.
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ ENTRY: Final = np.dtype([("cycle", "<u8"), ("pc", "<u4"), ("site", "<u4"), ("num
 ROOM: Final = 4096
 """Number of entries after which native code returns, so that the consumer is called."""
 BOUNDARY: Final = 0xFFFFFF
-"""Address of the instruction for a change that a boundary makes, for example by the entry of an interrupt."""
+"""Address of the instruction for a change by a hook or a boundary, for example by the entry of an interrupt."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,7 +116,7 @@ class ChangeLog:
             raise ValueError(ONE_INSTRUMENT)
         self.before_run()
         for name, wrapper in (
-            ("execute", self._after_instruction), ("boundary", self._after_boundary),
+            ("execute", self._around_instruction), ("boundary", self._after_boundary),
             ("after_retfie", self._after_instruction),
         ):  # fmt: skip
             vars(sequencer)[name] = wrapper(getattr(sequencer, name))
@@ -160,10 +161,24 @@ class ChangeLog:
             return
         self._consumer(self._entries[:count])
 
+    def after_hooks(self) -> None:
+        """Log what hooks have changed before the instruction at PC, and deliver all entries."""
+        self.before_run()
+        self._log_changes(BOUNDARY)
+
     def after_native_run(self) -> None:
         """Log what a native boundary has changed before an address without native code, then deliver all entries."""
         self._log_changes(BOUNDARY)
         self.after_run()
+
+    def _around_instruction(self, execute: Callable[[], None]) -> Callable[[], None]:
+        logged = self._after_instruction(execute)
+
+        def watched() -> None:
+            self.after_hooks()
+            logged()
+
+        return watched
 
     def _after_instruction(self, execute: Callable[[], None]) -> Callable[[], None]:
         state = self._core.state

@@ -45,6 +45,9 @@ class Counting(Protocol):
     def stop(self) -> None:
         """Stop counting."""
 
+    def after_hooks(self) -> None:
+        """Process what hooks may have changed before the instruction at PC."""
+
     def before_run(self) -> None:
         """Prepare for a run of native code."""
 
@@ -73,6 +76,9 @@ class CycleCounting:
         self.address = accounting.address
         self.start = accounting.start
         self.stop = accounting.stop
+
+    def after_hooks(self) -> None:
+        """Do nothing: hooks take no cycles."""
 
     def before_run(self) -> None:
         """Do nothing: the accounting has no state to prepare."""
@@ -124,6 +130,9 @@ class ExecutionCounting:
     def stop(self) -> None:
         """Do nothing."""
 
+    def after_hooks(self) -> None:
+        """Do nothing: hooks execute no instruction."""
+
     def before_run(self) -> None:
         """Do nothing."""
 
@@ -156,6 +165,7 @@ class ChangeCounting:
         self.start = log.start
         self.stop = log.stop
         self.before_run = log.before_run
+        self.after_hooks = log.after_hooks
 
     def after_run(self, reason: int) -> None:
         """Log changes by a complete boundary, and deliver the log. Python still has to finish an UNFINISHED one."""
@@ -187,6 +197,9 @@ class InstructionLogging:
         self.stop = log.stop
         self.before_run = log.before_run
         self._deliver = log.after_run
+
+    def after_hooks(self) -> None:
+        """Do nothing: the log holds the state before each instruction."""
 
     def after_run(self, _reason: int) -> None:
         """Deliver the log."""

@@ -195,6 +195,8 @@ class JitEngine:
     def run(self, limit: int) -> None:
         """Run at least one instruction, natively where possible."""
         state = self._state
+        if self._counting is not None:
+            self._counting.after_hooks()
         if state.edt or self._core.events.deadline < state.cycle:  # a hook called `kick` after the boundary
             self._core.sequencer.execute()
             return

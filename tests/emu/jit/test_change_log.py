@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 import emu
-from emu.dspic30f.change_log import ROOM, Change, Watched, WatchedNumber, changes_in
+from emu.dspic30f.change_log import BOUNDARY, ROOM, Change, Watched, WatchedNumber, changes_in
 from emu.dspic30f.jit.engine import JitEngine
 from emu.instruments.changes import log_changes
 from emu.instruments.vcd import WaveformRecorder
@@ -139,6 +139,53 @@ def test_changes_by_stores_interrupts_and_sleep(path: Path, engine: str, cycles:
     assert {one.number for one in expected} == set(range(len(watched)))
     assert found == expected
     assert machine.snapshot() == stepping.snapshot()
+
+
+@pytest.mark.parametrize("threshold", [1, 9])
+def test_a_change_by_a_hook_belongs_to_the_boundary_before_the_instruction(path: Path, threshold: int) -> None:
+    """Interpreted and native instructions log it alike, before they run. With a threshold of 9, handlers are cold."""
+    found = []
+    for engine in ("plain", "jit"):
+        machine, writes = machine_of(path, engine), list[tuple[int, int, int, int, int]]()
+        if isinstance(machine.runner, JitEngine):
+            machine.runner.threshold = threshold
+        machine.run(until="main")
+        watched = watched_by(machine)
+
+        def write(machine: Machine = machine, writes: list[tuple[int, int, int, int, int]] = writes) -> None:
+            value = machine.peek("rare") + 1000 & 0xFFFF
+            writes.append((machine.cycle, machine.pc, BOUNDARY, NAMES.index("rare"), value))
+            machine.poke("rare", value)
+
+        for place in ("deep", "_T1Interrupt", "_T2Interrupt"):
+            machine.hook_pc(place, write)
+        changes: list[Change] = []
+        stop = log_changes(machine, watched, lambda entries, to=changes: to.extend(changes_in(entries)))  # type: ignore[misc]
+        slices(machine, 12_000, 12_000)
+        stop()
+        assert set(writes) <= set(changes)
+        assert len(writes) > 20
+        found.append([one._replace(site=0) for one in changes])
+    assert found[0] == found[1]
+
+
+def test_a_watch_that_pauses_calls_a_hook_that_writes_once_per_arrival(path: Path) -> None:
+    """The pause follows the hooked instruction in each engine."""
+    pauses, calls = [], []
+    for engine in ("plain", "jit"):
+        machine, called = machine_of(path, engine), list[int]()
+        machine.run(until="main")
+
+        def write(machine: Machine = machine, called: list[int] = called) -> None:
+            called.append(machine.cycle)
+            machine.poke("rare", machine.peek("rare") + 1000 & 0xFFFF)
+
+        machine.hook_pc("deep", write)
+        pauses.append([(*one, machine.cycle, machine.pc) for one in emu.watch(machine, "rare", cycles=8_000)])
+        calls.append(called)
+    assert pauses[0] == pauses[1]
+    assert calls[0] == calls[1] == sorted(set(calls[0]))
+    assert len(calls[0]) > 10
 
 
 NESTED = """

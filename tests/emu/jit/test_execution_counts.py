@@ -8,8 +8,10 @@ import pytest
 
 import emu
 from emu.dspic30f.jit.engine import JitEngine
+from emu.image.loader import load_image
 from emu.instruments.coverage import Counts, count_executions
 from emu.machine.machine import Machine
+from emu.profile.cycle_shares import Profiler
 from tests.emu.jit.comparison.random_firmware import load, random_firmware
 from toolchain.driver import driver
 
@@ -72,6 +74,40 @@ def test_random_firmware(seed: int) -> None:
     assert state == other
     assert native.executed == plain.executed
     assert native.taken == plain.taken
+
+
+REPEATS = """
+    .include "p30F6014A.inc"
+    .global __reset
+__reset: mov #0x900, w15
+again:  inc w4, w4
+    and w4, #3, w6
+    repeat w6
+    inc 0x0A00
+    repeat #2
+    mov w4, 0x0A02
+    bra again
+"""
+
+
+def test_a_repeat_with_a_count_of_0_counts_for_itself(tmp_path: Path) -> None:
+    """The cycle of REPEAT and that of its target, which then runs once, belong to two instructions (isa.md §7.5)."""
+    source, target = tmp_path / "p.s", tmp_path / "p.elf"
+    source.write_text(REPEATS)
+    assert driver.main(["-nostdlib", "-nostartfiles", str(source), "-o", str(target)]) == 0
+    image = load_image(target)
+    counts, profiles = [], []
+    for engine in ("plain", "jit"):
+        counted_one, _ = counted(emu.load(target, engine=engine, board=None), 3_000)
+        counts.append((counted_one.executed, counted_one.taken))
+        machine = emu.load(target, engine=engine, board=None)
+        if isinstance(machine.runner, JitEngine):
+            machine.runner.threshold = 1
+        profiles.append(Profiler(machine, image).run(3_000).addresses)
+    assert counts[0] == counts[1]
+    assert profiles[0] == profiles[1]
+    repeat = 4 + image.symbols.find("again").address  # type: ignore[union-attr]
+    assert counts[0][0][repeat + 2] > 2 * counts[0][0][repeat] > 400
 
 
 def test_counting_ends(image: Path) -> None:

@@ -34,8 +34,6 @@ class FunctionFrame:
         self.counter: Final[CycleCounter] = counter if counter is not None else CycleCounter()
         self.counter.begin(self.e, layout.offset)
         self.b.before_slow = self.counter.flush_at_exit
-        self.at = 0
-        """Address of the instruction to which the passing cycles are accounted."""
         self.labels: Final[dict[int, str]] = {}
         """Labels of blocks by the address of their first instruction."""
         self.unwritten: Final[list[int]] = []
@@ -94,12 +92,12 @@ class FunctionFrame:
         self.v.leave(next_pc, CHANGED)
         e.start(on)
 
-    def advance(self, cycles: Number, mask: int, times: int = 1) -> None:
-        """Advance the clock by the `cycles` of the current instruction, executed `times` times.
+    def advance(self, pc: int, cycles: Number, mask: int, times: int = 1) -> None:
+        """Advance the clock by the `cycles` of the instruction at `pc`, executed `times` times.
 
         `mask`: W registers written as destination, for RAW stalls of the next instruction.
         """
         self.v.set("cycle", self.v.get("cycle") + cycles)
         self.v.set("stall", mask)
-        self.counter.add_cycles(self.at, cycles)
-        self.counter.count_execution(self.at, times)
+        self.counter.add_cycles(pc, cycles)
+        self.counter.count_execution(pc, times)

@@ -281,7 +281,6 @@ class Translator(FunctionFrame):
         """Begin the instruction `step`, which starts in cycle `start`."""
         b, row = self.b, step.insn.row
         b.begin(step.pc, step.facts.window_cycles)
-        self.at = step.pc
         b.now = start + stall + step.facts.access
         b.several_stores = step.facts.stores > 1
         b.loads_ahead = max(step.facts.loads - 1, 0)
@@ -319,7 +318,7 @@ class Translator(FunctionFrame):
     def _end_instruction(self, step: Step, cycles: Number, mask: int) -> bool:
         """End an instruction without flow. Return whether the block ends here too."""
         deferred = self.b.deferred
-        self.advance(cycles, mask)
+        self.advance(step.pc, cycles, mask)
         if deferred.sr is not None:
             self.counter.select_level()
         if step.pc == self.layout.do_end:
@@ -380,7 +379,7 @@ class Translator(FunctionFrame):
         """
         e, v, skipped = self.e, self.v, self._skipped
         taken, through, join = e.fresh("taken"), e.fresh("through"), e.fresh("join")
-        self.advance(cycles, mask)
+        self.advance(step.pc, cycles, mask)
         self.counter.flush()
         e.end(f"br i1 {truth(flow.cond)}, label %{taken}, label %{through}, !unpredictable !1")
         self._take(step, taken)
@@ -400,7 +399,7 @@ class Translator(FunctionFrame):
                 e.end(f"br label %{join}")
         except NeedsInterpreter:
             self.counter.flush()
-            e.end(f"br label %{self.exit(self.at, INTERPRET)}")
+            e.end(f"br label %{self.exit(one.pc, INTERPRET)}")
         e.start(join)
         v.new_block()
         return v.get("stall")
@@ -416,7 +415,7 @@ class Translator(FunctionFrame):
 
     def _flow(self, step: Step, flow: Flow, cycles: Number, mask: int) -> None:
         """Translate a flow that ends the block."""
-        self.advance(cycles, mask)
+        self.advance(step.pc, cycles, mask)
         if isinstance(flow, (Branch, Skip)):
             self._branch(step, flow)
             return
@@ -429,7 +428,7 @@ class Translator(FunctionFrame):
                 LlvmRulePaths(self.e).all(lambda m: flow_rules.execute_disi(m, self.layout.flow, count, after))
                 self._check_interrupts(step.next_pc)
             case Sleep():
-                self._idle(step.next_pc)
+                self._idle(step)
             case Goto(target):
                 self._go_to(step, target)
             case Call(target):
@@ -490,15 +489,15 @@ class Translator(FunctionFrame):
             raise NeedsInterpreter
         rule.fires(AccessEmitter(self.b), rule.operands)
 
-    def _idle(self, next_pc: int) -> None:
+    def _idle(self, step: Step) -> None:
         """Stop the CPU in Idle; the next boundary lets time pass."""
         e, offset = self.e, self.layout.offset
         e.store(pointer(e, offset["cpu.mode"]), IDLE, 16)
         e.store(pointer(e, offset["cpu.slept"]), self.v.get("cycle") - 1, 64)
         e.store(pointer(e, offset["events.deadline"]), 0, 64)
         check = self.counter.needs_check_after(self.b.deferred) | int(self.counter.checks_asleep)
-        self.check_changes(self.at, next_pc, check)
-        e.end(f"br label %{self.exit(next_pc, BOUNDARY_WORK)}")
+        self.check_changes(step.pc, step.next_pc, check)
+        e.end(f"br label %{self.exit(step.next_pc, BOUNDARY_WORK)}")
 
     # -- interrupts -------------------------------------------------------------------------------------------------
     def _check_interrupts(self, next_pc: int) -> None:

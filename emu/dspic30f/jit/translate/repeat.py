@@ -53,7 +53,7 @@ class RepeatTranslator:
                 self._whole_loop(step, target, count, stall)
             else:
                 paths.all(lambda m: flow_rules.execute_repeat(m, f.layout.flow, 0))
-                f.advance(stall + 1, step.facts.writes)
+                f.advance(step.pc, stall + 1, step.facts.writes)
                 f.jump(step.next_pc)
 
     def _is_native(self, target: Step) -> bool:
@@ -89,8 +89,7 @@ class RepeatTranslator:
         go = e.fresh("go")
         e.end(f"br i1 {f.fits(total).text}, label %{go}, label %{f.exit(step.pc, DEADLINE)}, !prof !0")
         e.start(go)
-        f.advance(stall + 1, step.facts.writes)
-        f.at = target.pc
+        f.advance(step.pc, stall + 1, step.facts.writes)
         if isinstance(count, int) and count == DIVIDE_COUNT and target.insn.row.mnemonic.startswith("DIV"):
             self._divide(target)
         else:
@@ -110,7 +109,7 @@ class RepeatTranslator:
         target.insn.row.does(b, target.insn.x)  # type: ignore[arg-type]
         b.commit()
         b.repeating = b.left_count = None
-        f.advance(DIVIDE_COUNT + 1, target.facts.writes, times=DIVIDE_COUNT + 1)
+        f.advance(target.pc, DIVIDE_COUNT + 1, target.facts.writes, times=DIVIDE_COUNT + 1)
 
     def _counted_loop(self, target: Step, count: Number, cycles: int, again: int) -> None:
         """Emit a counted loop.
@@ -134,7 +133,7 @@ class RepeatTranslator:
         b.commit()
         stall = b.select(left == count, 0, again) if again else 0
         b.repeating = b.left_count = None
-        f.advance(cycles + stall, target.facts.writes | b.deferred.mapped_w)
+        f.advance(target.pc, cycles + stall, target.facts.writes | b.deferred.mapped_w)
         f.counter.flush()
         fewer, more = left - 1, left != 0
         first = str(count) if isinstance(count, int) else count.text
@@ -147,7 +146,7 @@ class RepeatTranslator:
     def _begin(self, step: Step, target: Step, stall: Number, again: bool) -> None:
         """End the REPEAT instruction itself, then continue with the loop of its target."""
         f, e = self._f, self._f.e
-        f.advance(stall + 1, step.facts.writes)
+        f.advance(step.pc, stall + 1, step.facts.writes)
         f.counter.flush()
         if not again:
             f.jump(step.next_pc)
@@ -168,7 +167,6 @@ class RepeatTranslator:
         e.end(f"br i1 {early.text}, label %{go}, label %{f.exit(target.pc, BOUNDARY_WORK)}")
         e.start(go)
         f.counter.begin_instruction(target.pc)
-        f.at = target.pc
         stall = flow_rules.stall(f.v.get("stall"), target.facts.source_pointers)
         paths = LlvmRulePaths(e, on_path=f.v.new_block)
         b.begin(target.pc, None)
@@ -176,7 +174,7 @@ class RepeatTranslator:
         target.insn.row.does(b, target.insn.x)  # type: ignore[arg-type]
         b.commit()
         b.repeating = None
-        f.advance(target.insn.row.cycles + stall, target.facts.writes | b.deferred.mapped_w)
+        f.advance(target.pc, target.insn.row.cycles + stall, target.facts.writes | b.deferred.mapped_w)
         f.counter.flush()
         counting, check = paths.get(flow.sr) & RA, f.counter.needs_check_after(b.deferred)
 
