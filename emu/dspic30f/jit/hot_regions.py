@@ -28,16 +28,18 @@ class HotRegions:
     """Translated regions by start address."""
     cycles: dict[int, int] = field(default_factory=dict)
     """Sampled Tcy by start address of a region."""
-    _start: dict[int, int | None] = field(default_factory=dict)
-    """Start address of the region of each sampled PC, None outside all regions."""
+    _start: dict[int, int] = field(default_factory=dict)
+    """Start address of the region of each sampled PC that lies in one."""
 
     def sample(self, pc: int, cycles: int) -> Region | None:
         """Count `cycles` Tcy for the region that contains `pc`. Return the region if it has just become hot."""
-        if pc not in self._start:
-            self._start[pc] = next((start for start, region in self.regions.items() if pc in region.steps), None)
-        start = self._start[pc]
+        start = self._start.get(pc)
         if start is None:
-            return None
+            known = list(self.regions.items())  # a copy: a thread of another machine may add regions meanwhile
+            start = next((start for start, region in known if pc in region.steps), None)
+            if start is None:
+                return None
+            self._start[pc] = start
         before = self.cycles.get(start, 0)
         self.cycles[start] = before + cycles
         return self.regions[start] if before < HOT_CYCLES <= before + cycles else None

@@ -13,6 +13,7 @@ from emu.dspic30f.jit import engine as jit_engine
 from emu.dspic30f.jit import hot_regions
 from emu.dspic30f.jit.cache import ObjectCache
 from emu.dspic30f.jit.engine import JitEngine
+from emu.dspic30f.jit.translate.region import Region, Step
 from emu.machine.machine import Machine
 from tests.emu.jit.comparison.random_firmware import (
     Firmware,
@@ -324,6 +325,25 @@ def test_a_region_that_runs_long_is_compiled_again_and_replaced(
     if wait:  # otherwise the regions depend on when code arrives
         assert all(another.runner._code.blocks[word] == now[word] for word in replaced)
     assert not difference(plain, native)
+
+
+def test_an_address_is_sampled_for_a_region_that_is_translated_later() -> None:
+    """A thread of another machine may translate a region while this one looks for a sampled address."""
+    regions: dict[int, Region] = {}
+    hot = hot_regions.HotRegions(regions)
+    assert hot.sample(0x104, hot_regions.HOT_CYCLES) is None
+
+    class Steps(dict[int, Step]):
+        def __contains__(self, pc: object) -> bool:
+            regions.setdefault(0x200, Region(0x200))
+            return super().__contains__(pc)
+
+    step = Step(0x104, *[None] * 4)  # type: ignore[arg-type]
+    regions[0x100] = Region(0x100, Steps({0x104: step}))
+    assert hot.sample(0x300, 1) is None
+    assert 0x200 in regions
+    assert hot.sample(0x104, hot_regions.HOT_CYCLES) is regions[0x100]
+    assert hot.sample(0x104, hot_regions.HOT_CYCLES) is None
 
 
 def test_machines_with_one_program_share_what_was_translated() -> None:
