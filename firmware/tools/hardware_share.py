@@ -1,11 +1,11 @@
 """Compute the share of hardware-specific lines in the kernel: `python firmware/tools/hardware_share.py [--json]`.
 
 Two countings. Physical lines, comments and blanks included, as the paper counts: 489 of 2,783 lines, 17.6 %, without
-I/O device implementations (openswarm-original.md §1). Code lines: those that are left without comments and blanks.
+I/O device implementations (openswarm-original.md §1). Code lines: without comments and blanks.
 Hardware-specific is port/dspic30f; portable are kernel, options, interface and HAL contracts. Devices (io, board,
-openswarm_io.h, hal_io.h, and hal_reset.h: the hardware watchdog) and the other ports are not counted. What sets up the
-board before any device (clock, configuration words, pins, interrupt entries, the list of devices: board.c, pins.h and
-vectors.S of board/epuck) is a line of its own: the paper's count does not say where it put that.
+openswarm_io.h, hal_io.h, and hal_reset.h: the hardware watchdog) and the other ports are not counted. The set-up of
+the board before any device (clock, configuration words, pins, interrupt entries, the list of devices: board.c, pins.h
+and vectors.S of board/epuck) has its own line, because the paper does not say where it counts that set-up.
 """
 
 from __future__ import annotations

@@ -31,7 +31,7 @@ typedef sys_pcb *(*hal_pick)(void); /* kernel stack, slice level; returns the th
  *   HAL_KERNEL_STACK_GUARD        with HAL_STACK_TRAPS: bytes at the end of the kernel stack that such a trap needs
  *   HAL_STACK_GROWS_DOWN          if it does
  *   HAL_ALLOCATION_FAILS()        for tests: true makes the next allocation fail. Without it, never
- *   HAL_STACK_IS_TAKEN            if hal_stack_init takes something that hal_stack_release must give back
+ *   HAL_STACK_IS_TAKEN            if hal_stack_init takes resources that hal_stack_release must return
  *   HAL_WORD_IS_ONE_ACT           1 if loads and stores of a pointer and of 16 bits are atomic, else 0
  * and declares or defines inline:
  *   hal_lock_state hal_lock_slice(void);      at least level slice; nests; any context

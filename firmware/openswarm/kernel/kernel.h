@@ -147,7 +147,7 @@ bool kernel_stack_is_intact(void); /* its last byte was never written; for CPUs 
 typedef void (*os_teardown_function)(sys_pcb *p);
 extern os_teardown_function os_release_mutexes, os_release_joins, os_release_service;
 extern os_teardown_function os_run_cleanups; /* calls process_free(p) when the cleanups of p have run */
-extern bool (*os_free_joinable)(sys_pcb *p); /* true: freed what is to be freed, or kept a zombie */
+extern bool (*os_free_joinable)(sys_pcb *p); /* true: the memory is freed, or kept by a zombie */
 extern void (*os_watch)(void); /* kernel stack, slice level, after each tick; needs no heap */
 /* Kernel stack, slice level, after OS_POSTED was set: wake threads of the blocked list. */
 extern void (*os_grant_semaphores)(void), (*os_wake_notified)(void);

@@ -119,7 +119,7 @@ sys_pcb *process_next(const sys_pcb *p)
     return os_blocked;
 }
 
-/* Each PID in use is found at another position. */
+/* Searches for all PIDs in use end at different positions of the lists. */
 BOUNDS_AT("} while (", loop n, share start n * (n + 1) / 2);
 sys_pcb *process_find(uint16 pid)
 {
@@ -314,7 +314,7 @@ void section_start(void)
 
 void os_call_in_section(void (*run)(void *), void *arg)
 {
-    enum { NESTING_OFFSET = 0x4000 }; /* more sections than run can end */
+    enum { NESTING_OFFSET = 0x4000 }; /* more sections than run() can end */
     section_open();
     uint16 depth = critical_depth;
     critical_depth = (uint16)(depth + NESTING_OFFSET);

@@ -5,7 +5,7 @@
 
 static sys_cleanup *cleanups; /* of all threads, newest first; slice locked */
 static sys_pcb *dying;        /* threads on no other list whose cleanups are still to run, in order of their end */
-static sys_pcb *interrupted;  /* os_running of a handler in which cleanups run; NULL: they run elsewhere or not */
+static sys_pcb *interrupted;  /* os_running of a handler in which cleanups run; NULL: none runs in a handler */
 
 /* Returns the link to the newest cleanup of a thread, or NULL if it has none. */
 BOUNDS_AT("for (", loop c);

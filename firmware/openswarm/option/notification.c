@@ -9,7 +9,7 @@
 /* Marks the wait for a notification: the condition of a wait whose object is not an event is never called. */
 static bool notification_wait(sys_event_data *unused)
 {
-    return unused != NULL; /* a text of its own, so that no compiler merges it with another mark */
+    return unused != NULL; /* differs from other marks, so that no compiler merges it with one */
 }
 
 /* Kernel stack. */

@@ -1,8 +1,8 @@
 /* Infrared channel between several Kilobots (kilobots.py): carries light from emitters to the comparators and
  * converters of other robots, and runs all robots in lock step.
  *
- * Times are cycles since the first robot's power-on. The robot with the earliest time runs, up to the time of the next
- * one: so no pulse arrives late, and every run is the same. Light takes DELAY cycles from emitter to comparator, so it
+ * Times are cycles since the first robot's power-on. The robot with the earliest time runs up to the time of the next
+ * one, so no pulse arrives late, and every run is the same. Light takes DELAY cycles from emitter to comparator, so it
  * arrives in the future even of a receiver that is an instruction ahead.
  *
  * simavr models no conversion that the comparator or a capture starts; this file starts it. simavr reads a channel's

@@ -111,7 +111,7 @@ def _start(robot: Robot, image: Path, **scenario: int) -> Machine:
 def _follow(machine: Machine, arrived: Callable[[int], bool]) -> int:
     """Step until the program counter reaches an address; return the cost, or PATIENCE if interrupts fill the window.
 
-    On a busy host they do so in QEMU, whose clock runs on to the next tick while the CPU is looked at.
+    On a busy host this happens in QEMU: its clock advances to the next tick while the debugger reads the CPU's state.
     """
     begin = machine.now
     for _ in range(PATIENCE):

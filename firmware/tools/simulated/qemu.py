@@ -75,7 +75,7 @@ QEMU_VIRT = Board(
 def run_until(board: Board, image: Path, text: bytes, seconds: float = 5 * PATIENCE) -> bytes:
     """Return UART1's output up to a match of the regular expression `text`.
 
-    Raises Stopped with what came instead, NotInstalled.
+    Raises Stopped with the output received instead, or NotInstalled.
     """
     process = subprocess.Popen(
         board.command(image, "stdio"), stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL

@@ -14,11 +14,11 @@ INTERRUPT_LEVEL(T3, 5);
 /* Low nibble: phases A-D of the coils now; right rotation by a nibble = next index (epuck.md §3). */
 enum { PHASES = 0x956A };
 
-/* Shared with stepper.S, which relies on the order of the fields. A tick between two stores of a change does no
- * harm, so that nothing here holds the stepper back. */
+/* Shared with stepper.S, which relies on the order of the fields. A stepper interrupt between two
+ * stores of a change does no harm, so no lock is needed. */
 typedef struct {
-    volatile sint16 rate; /* sixths of a thousandth: 5 v; positive turns to the next index */
-    sint16 fraction;      /* 0..6191 */
+    volatile sint16 rate; /* 5 v, in 1/6192 step per tick; positive turns to the next index */
+    sint16 fraction;      /* 0..6191, in 1/6192 step */
     uint16 phases;
     volatile uint16 coils; /* 0x0F on, 0 off */
 } stepper;

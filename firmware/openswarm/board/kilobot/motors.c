@@ -51,7 +51,7 @@ static uint8 set(motor *m, int16_t mm_s)
     return m->spin_up_ms != 0 ? FULL_DUTY : duty;
 }
 
-/* kilolib's set_motors(first, second): header and source disagree which is which; the header's left, right is taken. */
+/* kilolib's set_motors(first, second): header and source disagree; as in the header, the first is left here. */
 void hal_motors_drive(int16_t left_mm_s, int16_t right_mm_s)
 {
     uint8 before = SREG;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* USART0 of the Kilobot, 38,400 baud 8N1. On the robot PD1 is the debug output and PD0 the charger's pin: bytes come in
- * only where something else drives PD0. */
+/* USART0 of the Kilobot, 38,400 baud 8N1. On the robot PD1 is the debug output and PD0 the charger's pin: bytes
+ * arrive only if external hardware drives PD0. */
 #include "io.h"
 #include "kernel.h"
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The NS16550 of QEMU's virt machine, 115,200 baud 8N1. QEMU sends a byte in no time. */
+/* The NS16550 of QEMU's virt machine, 115,200 baud 8N1. QEMU sends each byte at once. */
 #include "interrupts.h"
 #include "io.h"
 #include "kernel.h"

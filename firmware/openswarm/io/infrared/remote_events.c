@@ -108,7 +108,7 @@ static void transmit_own(uint16 id, const void *data, uint16 size)
     }
 }
 
-/* Returns the record of a robot, or a free one, or NULL: as many other robots were heard lately. */
+/* Returns the record of a robot, or a free one; NULL if all are in use by other robots heard lately. */
 static origin_record *record_of(uint16 number, uint16 now)
 {
     origin_record *unused = NULL;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Checks of update.c against forged and replayed programs: `DEVICES := update update_auth` makes them, and without
- * update_auth nothing is checked (io/update_auth/README.md). */
+/* Checks of update.c against forged and replayed programs: `DEVICES := update update_auth` links
+ * them; without update_auth nothing is checked (io/update_auth/README.md). */
 #ifndef OPENSWARM_AUTHENTICATION_H
 #define OPENSWARM_AUTHENTICATION_H
 
@@ -12,13 +12,13 @@ extern "C" {
 
 #ifdef SYS_UPDATE_AUTH
 
-/* Whether the rows of a store have the tag of these facts. A right tag is not computed again until it is forgotten. */
+/* Whether the rows of a store have the tag of these facts. A correct tag counts until Sys_Forget_UpdateTag. */
 bool Sys_Is_UpdateAuthentic(uint8 store, const sys_update *facts);
 void Sys_Forget_UpdateTag(uint8 store);
 /* Whether the version is above all that Sys_Keep_UpdateVersion has kept. */
 bool Sys_Is_UpdateAllowed(uint16 version);
 /* Keeps the version of a whole program, before another one is stored. false: the cells do not hold it. If power fails
- * meanwhile, what was kept before remains. */
+ * meanwhile, the version kept before remains. */
 bool Sys_Keep_UpdateVersion(uint16 version);
 
 #else

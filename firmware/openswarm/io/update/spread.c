@@ -6,9 +6,9 @@
 #include <string.h>
 
 enum {
-    ADVERTISEMENT = 0x80, /* +1: activated.  version 2, rows, CRC 4 */
-    REQUEST = 0xA0,       /* + row.  version 2, missing parts 3, identity 2 */
-    DATA = 0xC0,          /* + row.  part * 8 + upper bits of the identity, its low byte, 5 bytes */
+    ADVERTISEMENT = 0x80, /* +1: activated.  bytes: version 2, rows 1, CRC 4 */
+    REQUEST = 0xA0,       /* + row.  bytes: version 2, missing parts 3, identity 2 */
+    DATA = 0xC0,          /* + row.  part * 8 + upper bits of the identity, its low byte, 5 data bytes */
     KINDS = 0xE0,
     ROW = 0x1F,
     IDENTITY = 0x07FF, /* bits of the CRC that identify a program: two of one version share no rows */
@@ -174,7 +174,7 @@ static void on_advertisement(const uint8 *m)
         sys_update before = want;
         if (Sys_Begin_Update(&their)) {
             vain =
-                asked == MOST_ASKED ? before : vain; /* not begun again before this one ended or was in vain as well */
+                asked == MOST_ASKED ? before : vain; /* not begun again until this one ends or is in vain, too */
             want = their;
             refresh(); /* the store may have held a program that was not activated */
             next_row();

@@ -23,7 +23,7 @@
 extern "C" {
 #endif
 
-enum { SYS_SPREAD_BYTES = 8, SYS_SPREAD_KIND = 0x80, SYS_SPREAD_TICK = 120 /* ms: an infra-red frame of it is 105 */ };
+enum { SYS_SPREAD_BYTES = 8, SYS_SPREAD_KIND = 0x80, SYS_SPREAD_TICK = 120 /* ms; an infra-red frame takes 105 */ };
 
 void Sys_Start_Spreading(uint16 number);
 /* now: ms of a monotonic clock, the same for both calls. The caller sends a message before it calls Sys_Spread

@@ -5,7 +5,7 @@
 
 #ifdef __OPTIMIZE__
 #define HAL_KERNEL_STACK 224
-#else /* every value of every function in its frame */
+#else /* -O0: every function keeps all values in its frame */
 #define HAL_KERNEL_STACK 384
 #endif
 #define HAL_HEAP 3072

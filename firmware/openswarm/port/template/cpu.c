@@ -37,7 +37,7 @@ static sys_pcb *yield(void)
     return os_yield(os_running);
 }
 
-/* ---- Levels: replace by your interrupt mask. slice < device < whatever must never wait for the kernel
+/* ---- Levels: replace by your interrupt mask. slice < device < interrupts that must never wait for the kernel
  * ----------------- */
 
 static hal_lock_state raise_to(int wanted)

@@ -29,7 +29,7 @@ static void light(uint8_t pair, bool on)
     }
 }
 
-/* Switching off restarts the scan with the pair that is now wanted. */
+/* Restarts the scan with the selected pair, by switching the converter off and on. */
 static void restart(void)
 {
     ADCON1 = AUTOMATIC;

@@ -6,7 +6,7 @@
 
 enum { MS_TCY = 14746 /* 14,745.6; no distance is longer than 2 ms */, JUST_BEGUN = MS_TCY / 2 };
 
-/* The clock's interrupt has this level too: its flag may be waiting while TMR1 has begun again. */
+/* The clock's interrupt has this level, too: its flag may be pending after TMR1 has restarted at 0. */
 static uint32_t now(void)
 {
     uint16_t ticks = TMR1, ms = clock_now();

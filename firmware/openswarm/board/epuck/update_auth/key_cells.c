@@ -22,7 +22,7 @@ uint16_t hal_update_cell(uint8_t cell)
     return __builtin_tblrdl((uint16_t)(CELLS + 2u * cell));
 }
 
-/* No interrupt may come between the writes of the key of NVM. */
+/* No interrupt may occur between the writes of the key of NVM. */
 static void write(uint8_t cell, uint16_t value, uint16_t operation)
 {
     uint16_t level = SR & ALL_LEVELS;
