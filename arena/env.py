@@ -32,10 +32,10 @@ from arena.world.physics import World
 SENSED: Final = 3
 """One-hot code of the line-of-sight sensor: nothing, object, robot."""
 SIZE: Final = SENSED + 8 + 8 + 2
-"""Length of an observation: sensor, eight reflections (1: touches white), eight lights (1: dark), two wheel speeds."""
+"""Length of an observation: line-of-sight code, then `Senses.proximity`, `Senses.light` and the two wheel speeds."""
 Reward = Callable[[Supervisor], float]
 Command = Callable[[float, float], bytes]
-"""Translates wheel speeds in -1..1, left and right, into the bytes that a robot receives by Bluetooth."""
+"""Function that translates wheel speeds in -1..1, left and right, to the bytes that a robot receives by Bluetooth."""
 Vector = NDArray[np.float32]
 
 

@@ -16,7 +16,7 @@ Runs = Mapping[str, list[Trial]]
 BEGIN: Final = "<!-- results: written by `arena report`; what is between the two marks is replaced -->"
 END: Final = "<!-- end of results -->"
 PAIRS_SHOWN: Final = 20
-"""Pairs of a comparison that a table shows; `arena compare --json` has all."""
+"""Maximum number of pairs that a table shows; `arena compare --json` lists all."""
 
 
 def by_controller(runs: Runs) -> dict[str, dict[str, list[Trial]]]:

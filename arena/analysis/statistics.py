@@ -70,7 +70,7 @@ def signed_rank_p(one: Values, other: Values) -> float:
 
 
 EXACT_PAIRS: Final = 16
-"""Most differing pairs for which all sign flips, 65,536, are tried; more pairs use a seeded sample of flips."""
+"""Maximum number of unequal pairs for which all sign flips (65,536) are tried; more pairs use a seeded sample."""
 DRAWS: Final = 99_999
 
 

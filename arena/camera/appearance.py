@@ -16,7 +16,7 @@ from arena.scene.loader import Scene
 from arena.scene.schema import NAMED, Patch
 
 NOTHING, OBJECT, ROBOT, WALL, FLOOR, ABOVE = range(6)
-"""Pixel classes. NOTHING is only an answer of the line-of-sight sensor; ABOVE is the room above the walls."""
+"""Pixel classes. NOTHING is an answer of the line-of-sight sensor only; ABOVE is the room above the walls."""
 NAMES: Final = ("nothing", "object", "robot", "wall", "floor", "above")
 
 COLOURS: Final = np.array(

@@ -17,10 +17,10 @@ extern f64 rint(f64);
 enum pixel_class { NOTHING, OBJECT, ROBOT, WALL, FLOOR, ABOVE }; // as in appearance.py
 
 struct disc {
-    f64 ahead, left, radius, height; // in the list of a scene: x and y for the first two
+    f64 ahead, left, radius, height; // in a scene's list, `ahead` and `left` hold x and y
     i64 class;
-    i64 leds;     // of a robot, bit n: LED n of `led_positions` is lit; the bit after the last one: the body LED
-    f64 cos, sin; // of a robot's heading, in the camera frame
+    i64 leds;     // lit LEDs of a robot: bit n is LED n of `led_positions`, the next bit is the body LED
+    f64 cos, sin; // cosine and sine of a robot's heading, in the camera frame
 };
 
 // Position of an LED on a robot's edge: direction from the centre (forward, left), lowest and highest point.
@@ -43,7 +43,7 @@ struct polygon {
 };
 
 struct patch {
-    f64 x, y, radius; // no radius: a polygon
+    f64 x, y, radius; // radius 0: a polygon
     const f64 *corners;
     i64 count, class;
 };
@@ -56,7 +56,7 @@ struct view {
     const i64 *lit; // lit LEDs of each robot; null if cameras do not see LEDs
     const struct led *led_positions;
     i64 led_count, led_class, body_class;
-    f64 led_cos; // cosine of half the angle of the edge that a LED lights
+    f64 led_cos; // cosine of half the angle of the edge that an LED lights
     struct disc *robot_discs;
     const struct disc *object_discs;
     const struct disc *fixed;
@@ -337,7 +337,7 @@ static f64 wall_depth(const struct view *v, f64 slope)
     return max(min(to_x, to_y), v->nearest);
 }
 
-// The nearest hit at which the ray is not above the body, or is below the floor.
+// The nearest hit so far. A body that the ray passes above is no hit, unless the ray has reached the floor before.
 struct hit {
     f64 depth, height;
     i64 class;

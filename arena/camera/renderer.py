@@ -25,7 +25,7 @@ from arena.world.poses import Poses
 from emu.native_library import ADDRESS, DOUBLE, INT, address_of, functions
 
 NEAREST: Final = 0.05
-"""Depth in cm of a body that touches the lens."""
+"""Smallest depth in cm of a hit; a body that touches the lens is at this depth."""
 ROWS_CACHED: Final = 2048
 """Rows whose rays are cached: more than any setting of a sensor has."""
 WINDOW_COLUMNS: Final = tuple(240 + 8 * x for x in (6, 9, 12, 15))

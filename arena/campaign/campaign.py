@@ -41,7 +41,7 @@ _queue: Any = None
 
 @dataclass(frozen=True)
 class Plan:
-    """Definition of a run. `image` is the firmware, None for scripted robots; `brain` is the name it has for users."""
+    """Definition of a run. `image` is the firmware, None for scripted robots; `brain` is its name for `--brain`."""
 
     scene: Scene
     brain: str
@@ -186,7 +186,7 @@ def run_one(
 
 
 def _add_curves(rows: Rows, experiment: Experiment, about: dict[str, Any]) -> None:
-    """Add the curves of a user's experiment as columns, which show the record without the experiment's code."""
+    """Add the curves of a user's experiment as columns: commands then show the record without the experiment's code."""
     with suppress(SceneError):  # failing metrics must not lose the trial; the command reports them afterwards
         series = experiment.series(Trial(Path("trial"), rows.columns, about).samples)
         rows.columns.update({CURVE_COLUMN + name: values.tolist() for name, values in series.curves.items()})

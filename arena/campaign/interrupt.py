@@ -1,7 +1,7 @@
-"""SIGINT that a destructor cannot lose.
+"""Handler of SIGINT whose exception cannot be lost in a destructor.
 
 Python discards an exception that is raised in a destructor, and pymunk frees a space in one. A Ctrl-C at that moment
-would have no effect, so its handler also stores it for the next check.
+would have no effect, so the handler also stores that SIGINT has arrived, for the next check.
 """
 
 from __future__ import annotations

@@ -23,9 +23,9 @@ THRESHOLDS: Final = (10.0, 2.0)
 
 The detection threshold of libIrcom is 10 (swarmcom.md §3); 2 is one standard deviation of plausible noise."""
 BEST_DEG: Final = 31.5
-"""Direction between two neighbouring emitters: the brightest one with the default beams."""
+"""Direction in degrees between two neighbouring emitters, in which a robot is brightest with the default beams."""
 NEAR_CM: Final = 10.0
-"""Distance at which receivers in all directions have a signal."""
+"""Distance in cm at which receivers in all directions have a signal."""
 
 
 def parser() -> argparse.ArgumentParser:

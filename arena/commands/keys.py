@@ -74,7 +74,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _tables() -> dict[str, str]:
-    """Return the title in a file of every table, by its name in the schema."""
+    """Return the heading of every table in a scene file, by the table's name in the schema."""
     return {name: f"[{name}]" for name in TABLES} | {name: _IN_FILE.get(name, f"[[{name}]]") for name in LISTS}
 
 

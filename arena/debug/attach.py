@@ -33,7 +33,7 @@ class _PresentOnlyHistory(RobotHistory):
 
 
 class _PollingInbox(SimpleQueue[Message | None]):
-    """Messages of a client. The studio executes commands while `get` waits; None once the studio wants the robot."""
+    """Messages of a client. While `get` waits, the studio executes commands; None once the studio ends the session."""
 
     def __init__(self, wire: Wire, poll: Callable[[float], bool]) -> None:
         self._source: Final = wire.inbox
@@ -50,7 +50,7 @@ class _PollingInbox(SimpleQueue[Message | None]):
 
 
 class _PollingChannel:
-    """Channel to a client during whose waits the studio executes commands."""
+    """Channel to a client. While it waits for a message, the studio executes commands."""
 
     def __init__(self, wire: Wire, poll: Callable[[float], bool]) -> None:
         self.inbox: Final = _PollingInbox(wire, poll)

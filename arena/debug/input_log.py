@@ -29,7 +29,7 @@ class InputLog:
         self._levels: Final = _SensorLevels()
         camera, sources = machine.board.camera, machine.board.chip.adc.source
         camera.show_pixels(partial(self._pixels, camera.pixel_source))
-        self._ir.emit_in_python()  # in the past no conversion calls the native code that applies waiting edges
+        self._ir.emit_in_python()  # during a replay no conversion calls the native code that applies waiting edges
         for channel in SENSORS:
             sources[channel] = partial(self._level, channel, sources[channel])
 

@@ -174,7 +174,7 @@ class OpticalChannel:
     def levels(self, robot: int, cycle: int) -> Levels:
         """Return the response of other robots' receivers to a robot's pulse lines at a cycle of the trial.
 
-        It is that of a first-order low-pass to the light one quantum earlier, the same for every robot that asks.
+        The receivers are first-order low-passes, and light reaches them one quantum late. All receive the same levels.
         """
         found = (c_double * LINES)()
         arguments = self._emitters[robot].address, addressof(self.receivers), cycle - self.delay, addressof(found)

@@ -166,7 +166,7 @@ struct light {
     i64 on_at, delay, begin;
     struct source_list now, past;
     f64 lost_share, ripple_counts, ripple, noise_counts;
-    i64 lost_seen, lost_period; // a lost transmission is seen for `lost_seen` cycles in each `lost_period`
+    i64 lost_seen, lost_period; // a lost transmission is visible in the first `lost_seen` of every `lost_period` cycles
     u64 seed;
 };
 
@@ -208,7 +208,7 @@ struct poses {
     i64 robots, objects;
 };
 
-// The infrared sensors of robot number `robot` in the world. Pointers to functions: of propagation.c and of ring.c.
+// The infrared sensors of robot number `robot` in the world. The functions are those of propagation.c and ring.c.
 struct sensing {
     i64 (*signal)(const void *optics, const struct poses *poses, i64 own, i64 other, f64 *found);
     void (*surfaces)(const void *optics, const struct poses *poses, i64 own, f64 *found);
@@ -216,16 +216,16 @@ struct sensing {
     void (*reflect)(uint8_t *record, const void *ring, i64 sensor, f64 millimetres, f64 share);
     uint8_t *record;
     void *ring;
-    const uint8_t *adc_state; // of the converter: state, cycle at which it began, cycle at which its clock stopped
-    const u64 *adc_mark, *adc_frozen;
+    const uint8_t *adc_state;         // state of the converter
+    const u64 *adc_mark, *adc_frozen; // cycle at which this state began; cycle at which the converter's clock stopped
     const void *optics;
     struct poses *poses;
     struct light *light;
-    const struct history *const *histories; // of all robots
-    struct source *banks[2];                // with room for all robots
+    const struct history *const *histories; // emitter histories of all robots
+    struct source *banks[2];                // sources in this and in the last quantum, each with room for all robots
     i64 robot, quantum;
     i64 is_stale, has_lamps; // whether no sensor was converted in this quantum; whether room light depends on the pose
-    i64 begin;               // of this quantum, as a cycle of the board
+    i64 begin;               // cycle of the board at which this quantum begins
 };
 
 // Find the robots whose light can arrive in the quantum from cycle `begin` of the board on.

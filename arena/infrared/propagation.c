@@ -15,7 +15,7 @@ extern f64 sin(f64);
 extern f64 sqrt(f64);
 
 enum { SENSORS = 8, LINES = 4 };
-enum { POINTS = 11, SIDE_RAYS = 7 }; // of the response (ring.c); most rays on either side of a sensor's axis
+enum { POINTS = 11, SIDE_RAYS = 7 }; // points of the response (ring.c); rays at most on each side of a sensor's axis
 static const f64 PI = 3.14159265358979323846;
 
 struct disc {
@@ -44,9 +44,9 @@ struct optics {
     i64 fixed_count;
     const struct side *sides;
     i64 side_count;
-    const struct polygon *polygons; // in the order of their headings in the poses; out of reach: no corners
+    const struct polygon *polygons; // in the order of their headings in the poses; without corners if out of reach
     i64 polygon_count;
-    i64 side_rays; // of a sensor's beam, whose half-angle is `half_beam`
+    i64 side_rays; // rays on each side of a sensor's axis, up to the angle `half_beam`
     f64 half_beam, near[POINTS], counts[POINTS], slope[POINTS];
 };
 
@@ -99,7 +99,7 @@ static void offer_side(struct ray *ray, const struct side *one)
     ray->share = one->share * fabs((ray->east * dy - ray->north * dx) / sqrt(dx * dx + dy * dy));
 }
 
-// Offer all sides of walls, polygonal obstacles and movable polygons to a ray.
+// Intersect a ray with all sides of walls, polygonal obstacles and movable polygons.
 static void offer_sides(const struct optics *o, const struct poses *p, struct ray *ray)
 {
     for (i64 i = 0; i < o->side_count; i++)

@@ -178,7 +178,7 @@ class Optics:
         self._found_at = addressof(self._found)
 
     def _robot_discs(self, count: int) -> Array[_Disc]:
-        """Return the bodies of `count` robots as far as they reflect; those beyond the scene's are e-pucks."""
+        """Return the discs of `count` robots, radius 0 without reflection. Robots beyond the scene's are e-pucks."""
         of_scene = min(count, self._scene.robots.count)
         kinds = [*map(self._scene.robot_kind, range(of_scene)), *[EPUCK] * (count - of_scene)]
         return (_Disc * count)(*(

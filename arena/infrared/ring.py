@@ -24,14 +24,14 @@ from emu.boards.epuck.board import Epuck
 from emu.native_library import address_of
 
 LAMP_CM: Final = 100.0
-"""Distance at which `light.lamp_counts` holds."""
+"""Distance in cm to which `light.lamp_counts` refers."""
 LOST_TCY: Final = (round(0.0008 * FCY), round(0.0024 * FCY))
 """(visible, period) in Tcy: a lost transmission is visible only in the first 0.8 ms of every 2.4 ms.
 
 A proximity flash of 0.73 ms stays visible. A frame begins with at least 2.4 ms of light
 (firmware/openswarm/io/infrared), so its start is never detected."""
 _RIPPLE: Final = math.tau * 100 / FCY
-"""Ripple of lamps on the mains, rad per Tcy."""
+"""Angular frequency of the 100 Hz ripple of lamps on the mains, rad per Tcy."""
 
 
 class _Source(Structure):

@@ -47,7 +47,7 @@ struct code {
 // A robot. Ticks count quanta since the start of the trial. Cycles count from power-on, at cycle `on_at` of the trial.
 struct robot {
     i64 state, tick; // tick: quantum whose poses the robot waits for
-    i64 exit_reason; // of the last call of native code
+    i64 exit_reason; // why the last call of native code returned
     struct native *native;
     const struct code *code;
     i64 quantum, on_at;
@@ -66,10 +66,10 @@ struct robot {
     i64 noise_shift; // a random 32-bit number, shifted by this, is the index of a line's first noise value
     const void *pair;
     void *drive, *generator;
-    i64 *steps;    // [most quanta of one run][2]: motor steps of the left and the right wheel in each quantum
-    i64 row, href; // of the picture and of the camera line that is to be rendered
+    i64 *steps;    // motor steps of the left and the right wheel in each quantum of a run
+    i64 row, href; // picture row of the camera line that is to be rendered; cycle of its HREF
     void *sensing;
-    i64 senses, sensed_tick; // whether infrared sensors have been read; quantum that has begun for them
+    i64 senses, sensed_tick; // whether infrared sensors were ever read; last quantum that `begin_quantum` has begun
 };
 
 // The world (physics.py).
@@ -247,7 +247,7 @@ static void run_robot(struct robot *r, const struct native_world *g)
     }
 }
 
-// Claim and run robots of the round until none is left. Return how many.
+// Claim and run robots of the round until all are claimed. Return how many this thread has run.
 static i64 run_share(struct scheduler *s)
 {
     i64 unclaimed, runs = 0;
@@ -275,7 +275,7 @@ static void wake_workers(struct scheduler *s)
             s->release(s->workers[i].lock);
 }
 
-// Main function of a worker thread. A round does not wait for a worker that comes late.
+// Main function of a worker thread. A round does not wait for a worker that wakes late.
 void worker_main(struct scheduler *s, struct worker *w)
 {
     i64 seen = 0, now;

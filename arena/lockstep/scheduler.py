@@ -51,7 +51,7 @@ class RunAheadRobot(Protocol):
 
     def use_poses(self, poses_at: Callable[[int], tuple[Poses, Poses]]) -> None:
         """Take poses from `poses_at(tick)` from now on: those at the start of quantum `tick` and of the quantum
-        before. When it asks, the robot must have finished all quanta before `tick`."""
+        before. At a call the robot must have finished all quanta before `tick`."""
 
 
 class LockStep:

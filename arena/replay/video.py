@@ -26,11 +26,11 @@ from emu.host.files import atomic_file
 SCALE: Final = 1.6
 """Pixels per cm in a scene of e-pucks. The smallest robot of a scene is as large as an e-puck."""
 FRAMES_PER_S: Final = 12.5
-"""Frame rate of the video; a frame lasts 8 of the hundredths of a second in which GIF counts."""
+"""Frame rate of the video: a frame lasts 80 ms, because GIF counts in hundredths of a second."""
 LIMIT: Final = 20_000
-"""Most frames of a video; more frames are probably a mistake in --speed."""
+"""Maximum number of frames of a video; more are probably a mistake in --speed."""
 MAX_NUMBERED: Final = 50
-"""Most robots whose numbers a frame shows; those of a larger crowd overlap."""
+"""Maximum number of robots whose numbers a frame shows; the numbers of more robots would overlap."""
 _LINE: Final = 14
 _PIXEL: Final = 6
 _INK, _PAPER, _PALE = palette.rgb(palette.INK), palette.rgb(palette.PAPER), (221, 221, 221)

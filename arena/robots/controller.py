@@ -18,19 +18,19 @@ from arena.world.physics import STREAM_SENSORS, STREAM_START, generator, traits_
 from arena.world.poses import Poses
 
 LATENCY_TCY: Final = 258_484
-"""Time from the middle of the sensor window's rows to the new wheel speed, 17.5 ms.
+"""Time in Tcy from the middle of the sensor window's rows to the new wheel speed, 17.5 ms.
 
 The `clustering` firmware reads the picture region to its end (16.4 ms) before it answers.
 """
 FIRST_FRAME_TCY: Final = 853_232
-"""Time from power-on to the first middle of the sensor window.
+"""Time in Tcy from power-on to the first middle of the sensor window.
 
 tests/arena/robots/test_firmware_controller.py measures this value and LATENCY_TCY on the `clustering` firmware.
 The published trials used them, so they stay. The firmware is 0.15 ms later, at 855,484 Tcy, because the camera model
 includes the last bit of a register's value.
 """
 OK_DECODED_TCY: Final = 354_275
-"""Time from the remote control's key until the `clustering` firmware has decoded it, 24.0 ms (bare: 345,804)."""
+"""Time in Tcy from the remote control's key until `clustering` has decoded it, 24.0 ms (`clustering-bare`: 345,804)."""
 NEVER: Final = 1 << 62
 """A cycle after the end of every trial."""
 STRIP_COLUMNS: Final = range(240, 400)

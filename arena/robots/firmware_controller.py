@@ -411,7 +411,7 @@ class FirmwareController:
         return Reading(-1, load, self._leds, strip, self._ring.readings, self._fault or self._fault_text)
 
     def _update_strip(self) -> None:
-        """Take over the last recorded line if native code has rendered it."""
+        """Copy the last recorded line if native code has rendered it."""
         if (rays := self.native.take_strip_rays()) is not None and rays.columns is not None:
             self._strip = rays.columns, rays.pixels
 

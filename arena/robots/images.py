@@ -16,7 +16,7 @@ from emu.host import paths
 from emu.host.private_folder import danger, make_private
 
 APPLICATIONS: Final = {"openswarm": "clustering", "bare": "clustering-bare"}
-"""Applications of firmware/apps with a name of their own as a brain."""
+"""Applications of firmware/apps by the brain names that differ from theirs."""
 
 
 def image_for(brain: str, home: Path = Path(), kind: str = EPUCK.name) -> Path | None:

@@ -29,15 +29,15 @@ from emu.boards.kilobot.overhead import send_frame
 from emu.boards.kilobot.swarm import ADC7, FULL_SCALE, KilobotFaultError, KilobotSetup, KilobotSwarm, microvolts
 
 LAMP_CM: Final = 100.0
-"""Distance at which the counts of a lamp hold."""
+"""Distance in cm to which the counts of a lamp refer."""
 NEAREST_CM: Final = 5.0
-"""Least distance to a lamp in the law of its light: lamps hang above the table. UNVERIFIED"""
+"""Least distance in cm to a lamp in the inverse-square law: lamps hang above the table. UNVERIFIED"""
 MAX_DUTY: Final = 255
 LINE_LIMIT: Final = 200
 """Bytes after which a line of the debug UART without a line end is cut."""
 _EMITTING: Final = (DDRB, PORTB)
 MAX_VARIABLES: Final = 24
-"""Variables that `KilobotController.inspection` shows."""
+"""Maximum number of variables that `KilobotController.inspection` shows."""
 
 
 def controllers(
@@ -122,7 +122,7 @@ class KilobotCrowd:
         return round(self._commands[0][0] * HZ) if self._commands else 0
 
     def _send(self) -> None:
-        """Let the overhead controller send its message, and find out when the next one begins."""
+        """Let the overhead controller send its message; store the time at which the next one begins."""
         start, name, seconds = self._commands[0]
         self._frame_at = send_frame(self.swarm, frame(Message(bytes(DATA_SIZE), TYPES[name])))
         if self._frame_at >= (start + seconds) * HZ:
@@ -213,7 +213,7 @@ class KilobotController:
             self._set_leds(red | green << 2 | blue << 4, change.cycle)
 
     def _note_reset(self, cause: str, cycle: int) -> None:
-        """Add a line to the log. Jumps within 1 ms count once, as of a program that does nothing else."""
+        """Add a line to the log. Resets within 1 ms of each other give one line, as in an endless loop of resets."""
         at = self._trial_cycle(cycle)
         if at - self._reset_at >= FCY // 1000:
             self._lines.append(SerialLine(at, f"reset: {cause}"))

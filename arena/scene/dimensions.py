@@ -25,7 +25,7 @@ THRUST: Final = 1.0
 BRAKE: Final = 1.04
 """N needed to push a robot whose wheels are at rest: its tyres must slip, 0.7 m g (epuck.md §3).
 
-The gears cannot be turned by the wheels. The value is above THRUST: otherwise one robot could push another for ever.
+The wheels cannot turn the gears. The value is above THRUST: otherwise one robot could push another for ever.
 """
 
 KILOBOT_RADIUS, KILOBOT_HEIGHT = 1.65, 3.4
@@ -57,7 +57,7 @@ RING_HEIGHTS: Final = (3.5, 4.5)
 FRONT_HEIGHTS: Final = (1.1, 1.9)
 """Lower and upper heights of the ring LEDs and of the front LED, UNVERIFIED."""
 LED_COS: Final = math.cos(0.5 / ROBOT_RADIUS)
-"""Cosine of half the angle of the edge that a LED lights, 1 cm, UNVERIFIED."""
+"""Cosine of half the angle of the edge that an LED lights, 1 cm, UNVERIFIED."""
 
 IR_BEARINGS_DEG: Final = (18.0, 45.0, 90.0, 142.0, 218.0, 270.0, 315.0, 342.0)
 """Bearings of the sensors, clockwise from the front; each one faces radially outwards from the edge (epuck.md §5)."""

@@ -214,7 +214,7 @@ def _check_has_effect(scene: Scene, section: str, key: str) -> None:
 
 
 _OF_GROUP: Final = {"selector": -1, "remote": INHERIT, "stimulus": INHERIT}
-"""Keys of a group that replace the keys of [start], and their default values, with which they do not replace them."""
+"""Keys of a group that replace the keys of [start], and their default values, which leave [start] in force."""
 
 
 def scripted(scene: Scene) -> Scene:

@@ -125,7 +125,7 @@ def _shifted(corner: tuple[float, float], centre: Place) -> tuple[float, float]:
 
 
 def outlines_of(scene: Scene) -> list[geometry.Side]:
-    """Return the sides of the room and of its obstacles, as far as they are polygons."""
+    """Return the sides of the room and of its polygonal obstacles."""
     shapes = [scene.arena.polygon, *(one.polygon for one in scene.obstacles)]
     return [side for shape in shapes if shape for side in geometry.sides(shape)]
 

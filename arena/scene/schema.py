@@ -214,7 +214,7 @@ class Kilobots:
 
     - `speed_cm_s`: speed ahead at the calibrated duties; `turn_deg_s`: turning rate of one motor at its calibrated duty
     - `motor_sd`: standard deviation of the strength of motors, which the calibration in the EEPROM compensates;
-      `calibration_sd`: that of the rest, which it does not
+      `calibration_sd`: standard deviation of the error that remains after the calibration
     - `motion_noise`: share of the motion, drawn every `noise_period_s` of [chassis]
     - `thrust_n`: force of the legs on the table while motors run; `brake_n`: force that pushes a robot at rest
     - `clock_sd`: standard deviation of the frequency of the oscillators

@@ -26,7 +26,7 @@ EVERY_S: Final = 10.0
 PATIENCE_S: Final = 5.0
 """Seconds to wait for a process to end."""
 _HEAD: Final = struct.Struct("<Q")
-"""Length of a message."""
+"""Head of a message: the length of the rest in bytes."""
 
 
 class PipeClosedError(ConnectionError):

@@ -22,9 +22,9 @@ from arena.scene.robot_kind import KILOBOT
 from arena.world.physics import World
 
 _OBJECT: Final = ("x", "y", "heading")
-"""Columns of an object; the last one for polygons."""
+"""Columns of an object; only polygons have a heading."""
 TO_ALL: Final = -1
-"""Receiver of a message that a Kilobot sends to all robots in reach."""
+"""Receiver in the record of a message that a Kilobot sends to all robots in reach."""
 STOPPED: Final = (0.0, 0.0)
 """Wheel speeds of a robot at rest."""
 

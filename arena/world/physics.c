@@ -41,7 +41,7 @@ struct disc {
 
 // How the commanded values (left, right) move a robot: `Drive` of robot_kind.py.
 struct drive {
-    f64 axle; // of wheels; 0: vibration motors
+    f64 axle; // distance between the wheels; 0: vibration motors
     f64 ahead, turn, leg_back, leg_aside;
     f64 thrust, thrust_torque, brake, brake_torque;
 };
@@ -59,7 +59,7 @@ struct world {
     f64 dt;
     i64 robot_count, object_count;
     struct robot *robots;
-    struct disc *discs; // the robots', then the objects; of a polygon the circumscribed circle
+    struct disc *discs; // discs of the robots, then of the objects; for a polygon its circumscribed circle
     i64 steps;
     void **polygons; // bodies of the objects that are polygons
     i64 polygon_count;

@@ -11,7 +11,7 @@ from arena.experiments.uart_values import alive, last_values, settled_at
 from arena.metrics import MetricSeries
 
 AGREED = 0.05
-"""Chosen tolerance: in the scene, one robot too many or too few changes the mean by more."""
+"""Chosen tolerance. In the scene, a mean that counts one robot too many or too few is off by more."""
 
 CURVES = [
     Curve("error", "greatest error of a robot's mean"),

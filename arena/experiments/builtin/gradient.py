@@ -40,7 +40,7 @@ MEASURES = [
 
 
 def all_curves(samples: TrialSamples) -> Mapping[str, Floats]:
-    """Return both metrics; a robot without a path shows its count if its LED is dark."""
+    """Return both metrics; for a robot without a path, a dark LED counts as correct."""
     shown = samples.led_states()
     correct, longest = [], []
     for sample, robots in enumerate(samples.robots):

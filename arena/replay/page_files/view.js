@@ -1,7 +1,7 @@
 "use strict";
 const d = JSON.parse(document.getElementById("trial").textContent);
 const el = id => document.getElementById(id);
-let INK = "#222", LINE = "#bbb", MARK = "#cce5f5";  // colours of style.css, which has a dark set
+let INK = "#222", LINE = "#bbb", MARK = "#cce5f5";  // `colours` replaces them by those of style.css, light or dark
 const canvas = el("view"), g = canvas.getContext("2d"), scrub = el("scrub"), play = el("play");
 const strips = el("strips"), h = strips.getContext("2d"), plot = el("plot"), q = plot.getContext("2d");
 const SEEN = ["nothing", "object", "robot"];
@@ -9,9 +9,9 @@ const SEEN_COLOUR = d.palette.seen, GROUPS = d.palette.groups;
 const POLL_MS = 1000, FRAME_MS = 16, FCY = 14745600, TRAIL_S = 30, MARGIN = 14;
 const LEDS = ["led0", "led1", "led2", "led3", "led4", "led5", "led6", "led7", "front", "body"];
 const STRIP_HEIGHT = 14, STRIP_PIXEL = 8;
-const BEARING = Math.PI / 4;             // between two ring LEDs, clockwise from the front
+const BEARING = Math.PI / 4;             // angle between two ring LEDs, which follow clockwise from the front
 let PLOT_HEIGHT = 62, plotWidth = 384, sample = 0, playing = false, clock = 0, last = 0, chosen = -1, scale = 1, left = 0, low = 0;
-let zoom = 1, panX = 0, panY = 0;        // of the view, relative to the whole arena in the middle
+let zoom = 1, panX = 0, panY = 0;        // zoom and offset in pixels; 1, 0, 0 shows the whole arena in the middle
 const X = x => left + x * scale, Y = y => low - y * scale;
 
 function sized(c, width, height) {       // gives a canvas as many pixels as the screen has
@@ -66,7 +66,7 @@ function lit(robot) {                    // LEDs that are on now or were on sinc
   return d.lights[sample].reduce((leds, l) => l.robot === robot ? leds | l.leds : leds, d.robots[robot].leds[sample]);
 }
 function isKilobot(robot) { return d.bodies[robot].kind === "kilobot"; }
-function colour(robot) {                 // of a Kilobot's LED at the present time; grey: dark
+function colour(robot) {                 // colour of a Kilobot's LED at the present time; grey if it is dark
   let leds = d.robots[robot].leds[sample];
   for (const l of d.lights[sample + 1] || []) if (l.robot === robot && l.cycle / FCY <= clock) leds = l.leds;
   return leds ? `rgb(${85 * (leds & 3)} ${85 * (leds >> 2 & 3)} ${85 * (leds >> 4 & 3)})` : "#ddd";
@@ -211,7 +211,7 @@ function drawPlot() {
     q.beginPath(); q.strokeStyle = "#d55e00"; const at = clock / end * width; q.moveTo(at, top); q.lineTo(at, top + high); q.stroke();
   });
 }
-function drive(robot) {                  // text: wheel speeds and what the robot sees, or duties and LED
+function drive(robot) {                  // text of an e-puck's wheel speeds and sensor, or a Kilobot's duties and LED
   const r = d.robots[robot], of = by => `${(by * r.left[sample]).toFixed(0)}, ${(by * r.right[sample]).toFixed(0)}`;
   if (isKilobot(robot)) return `motors ${of(1)} of 255  LED ${ledNames(robot, r.leds[sample]) || "off"}`;
   return `wheels ${of(10)} mm/s  sees ${SEEN[r.seen[sample]] || "?"}`;
@@ -233,7 +233,7 @@ function drawStrips() {
       h.fillStyle = `rgb(${bytes.charCodeAt(p)} ${bytes.charCodeAt(p + 1)} ${bytes.charCodeAt(p + 2)})`;
       h.fillRect(20 + p / 3 * STRIP_PIXEL, y + 1, STRIP_PIXEL, STRIP_HEIGHT - 2);
     }
-    if (bytes.length) {                  // a frame in the colour of what the controller saw
+    if (bytes.length) {                  // a border in the colour of the class that the controller saw
       h.strokeStyle = SEEN_COLOUR[r.seen[sample]] || LINE; h.lineWidth = 2;
       h.strokeRect(20, y + 1, bytes.length / 3 * STRIP_PIXEL, STRIP_HEIGHT - 2);
     }
