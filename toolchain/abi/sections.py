@@ -5,7 +5,7 @@ from __future__ import annotations
 from toolchain.abi.target import NEAR_BYTES
 from toolchain.ir.model import Module, size_of
 
-# By section that an attribute selects (frontend/attributes.py): its attributes. The initialiser adds bss or data.
+# Attributes of each section that an attribute in C selects (frontend/attributes.py). The initialiser adds bss or data.
 SECTION_ATTRIBUTES = {".near": ",near", ".far": "", ".xmemory": ",xmemory", ".ymemory": ",ymemory"}
 
 

@@ -35,7 +35,7 @@ class AnalysisCache:
         self.preserved: Final = PreservedRegisters(graph)
         self.codes: Final[dict[int, FunctionGraph]] = {}
         self.results: Final[dict[object, FunctionResult]] = {}
-        """By function, calling context and whether iterations are shared."""
+        """Results by function, calling context and whether iterations are shared."""
 
 
 class CallContexts(ABC):
@@ -91,7 +91,7 @@ class CallContexts(ABC):
     def _key(self, entry: int, state: AbstractState) -> object:
         """Return the memoisation key of a context.
 
-        With shared iterations it includes the enclosing scopes, with annotated recursions the active ones.
+        It contains the enclosing scopes of shared iterations, and the active functions with annotated recursion.
         """
         around = [one for one in self.call_stack if one in self.flow_facts.sharing_scopes] if self.sharing else []
         active = [one for one in self.call_stack if one in self.flow_facts.recursion_depths]

@@ -67,7 +67,7 @@ class Bound:
 
     @property
     def stack_is_known(self) -> bool:
-        """Whether the stack has a bound: missing loop bounds alone do not unbound it."""
+        """Whether the stack has a bound, which it may have although loop bounds are missing."""
         return not self.unbounded_stack
 
     @property

@@ -29,7 +29,7 @@ def options_of() -> argparse.ArgumentParser:
 
 def main(arguments: list[str]) -> int:
     """Run one operation (first letter of the key, as in GNU ar); return 0."""
-    words = [word for word in arguments if word != "-omf=elf" and not word.startswith("-mdfp=")]  # MPLAB X gives them
+    words = [word for word in arguments if word != "-omf=elf" and not word.startswith("-mdfp=")]  # from MPLAB X
     if words and re.fullmatch("-[rqdtxcsuvD]+", words[0]):
         words[0] = words[0][1:]
     options = options_of().parse_args(words)

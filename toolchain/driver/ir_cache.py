@@ -1,7 +1,7 @@
 """IR of unchanged C files from the cache (-fcache-ir).
 
-The key of an entry is the hash of the compiler, the flags, and the source file with its content. Folders count as debug
-information names them: checkouts and installations in several places share entries.
+The key of an entry is the hash of the compiler, the flags, and the source file with its content. The key has the
+paths of folders as they are in debug information, so checkouts and installations in several places share entries.
 
 The entry names the headers that clang read, with their hashes. It also names the files that would be other headers of
 the same name: a new file there could be the one that clang reads instead. An entry is valid while nothing of this
@@ -38,7 +38,7 @@ VARYING: Final = re.compile(rb"__(DATE|TIME|TIMESTAMP)__|__has_(include|embed)|[
 LEADING_DOTS: Final = re.compile(r"^(\./+)+")
 SPLICE: Final = re.compile(rb"\\\r?\n")
 CLOCK_TICK: Final = 0.02
-"""Maximum delay in seconds of the clock that stamps files behind that of `time.time`."""
+"""Maximum lag of time stamps of files behind `time.time`, in seconds."""
 PREFIX_MAP: Final = re.compile(r"-f(file|debug)-prefix-map=([^=]*)=(.*)")
 SEARCH_FLAGS: Final = ("-I", "-iquote", "-isystem", "-idirafter")
 FORCED_INCLUDES: Final = ("-include", "-imacros")
@@ -90,7 +90,7 @@ class IrCache:
         folders = sorted({os.path.dirname(path) or "." for path in read} | _header_folders(job))
         maps = [old for _, old, _ in _prefix_maps(job) if old not in folders and old.startswith((".", *folders))]
         named = [*headers, *(f"./{path}" for path in headers)]
-        if any(path.startswith(old) for path in named for old in maps):  # the key does not tell how it is named
+        if any(path.startswith(old) for path in named for old in maps):  # the key lacks a header's new name
             return
         names = {path[len(folder) + 1 :] for folder in folders for path in headers if path.startswith(f"{folder}/")}
         names |= {os.path.basename(path) for path in headers}
@@ -178,7 +178,7 @@ def _portable(text: str) -> str:
 
 
 def _absolute(text: str) -> str:
-    """Return the text of which `_portable` has made this one."""
+    """Return the text with the folders of own headers instead of their names, the inverse of `_portable`."""
     for folder, name in OWN_HEADERS.items():
         text = text.replace(name, folder)
     return text

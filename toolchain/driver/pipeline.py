@@ -323,7 +323,7 @@ class ModuleCompiler:
         self._emit(c)
 
     def _context(self, f: Function) -> FunctionContext:
-        """Prepare a function for the passes. Raises UnsupportedError for a signature that it must not have."""
+        """Prepare a function for the passes. Raises UnsupportedError for an invalid interrupt or naked function."""
         notes = self.notes.get(f.name, set())
         interrupt = attributes.interrupt_kind(notes, self.declared(f.name))
         probe = attributes.wants_probe(notes, self.options.stack_check and not interrupt)

@@ -38,7 +38,7 @@ LANGUAGES = {".c": "c", ".cpp": "c++", ".s": "assembler"}
 Dependency = tuple[tuple[str, ...], int, int]
 """Parts of a file's path below the parent folder of `toolchain`, size in bytes, time of modification (ns)."""
 Compile = Callable[[CcOptions, Input, Path], bytes]
-"""Compiles one source with a scratch folder; passed as an argument because the driver needs this library."""
+"""Function that compiles one source with a scratch folder; a parameter, because the driver imports this module."""
 
 
 def library(compile_one: Compile, jobs: int = 0) -> bytes:

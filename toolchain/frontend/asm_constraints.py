@@ -13,7 +13,7 @@ CLASSES = {
     "v": (13,), "x": (8, 9), "y": (10, 11), "z": (4, 5, 6, 7),
 }  # fmt: skip
 """Registers by constraint letter (XC16 User's Guide, register letters): WREG, divide, multiply, general, no divide,
-write-back of accumulators, X and Y prefetch, MAC factors. Classes W1-W14 and W2-W14 have the caller-saved ones only."""
+write-back of accumulators, X and Y prefetch, MAC factors. Of W1-W14 and W2-W14 only caller-saved ones are used."""
 
 REFUSED = re.compile(rb"invalid (?:in|out)put constraint '[=+&%]*[abcdevxyz]' in asm")
 """Pattern of clang's error message for a source that needs `respell`."""

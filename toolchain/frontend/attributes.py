@@ -26,7 +26,7 @@ _SPACES = {
 }  # fmt: skip
 
 Rewrite = Callable[[list[str], int], list[str]]
-"""Attributes of clang for the arguments of an attribute of XC16 and a number that no other attribute has."""
+"""Function that returns clang's attributes for the arguments of an attribute of XC16 and a unique number."""
 
 
 def _annotation(name: str) -> Rewrite:
@@ -95,7 +95,7 @@ REWRITES: dict[str, Rewrite] = {
     "unordered": lambda _arguments, _number: [],  # position in the section, which the linker chooses in any case
     "sfr": lambda _arguments, _number: ['__section__("sfr")'],  # the linker knows the addresses of the chip's registers
     "space": _space,
-    "noclone": lambda _arguments, _number: [],  # of GCC: copies of a function are the optimiser's own
+    "noclone": lambda _arguments, _number: [],  # ignored: clang has no such attribute
     "externally_visible": lambda _arguments, _number: ["__used__"],
     **{name: _refusal(name) for name in ("boot", "secure", "eds", "fillupper")},
 }  # fmt: skip

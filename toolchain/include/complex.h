@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* C11 7.3: complex arithmetic. The functions follow annex G for finite numbers; results for infinities and NaN are those of
- * the formulas. long double is double, and so are its functions. */
+ * the formulas. long double is double, with the same functions. */
 #ifndef COMPLEX_H
 #define COMPLEX_H
 

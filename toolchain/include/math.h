@@ -150,7 +150,7 @@ float fdimf(float x, float y);
 float fmaf(float x, float y, float z);
 float nanf(const char *payload);
 
-/* long double is double (abi-elf.md §1.1), and so are its functions. */
+/* long double is double (abi-elf.md §1.1), with the same functions. */
 #define MATH_LONG(result, name, ...) result name##l(__VA_ARGS__) __asm__(#name)
 MATH_LONG(long double, acos, long double x);
 MATH_LONG(long double, asin, long double x);

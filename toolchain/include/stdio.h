@@ -72,7 +72,7 @@ int snprintf(char *__restrict to, size_t size, const char *__restrict format, ..
 int vsnprintf(char *__restrict to, size_t size, const char *__restrict format, va_list arguments)
     __attribute__((__format__(__printf__, 3, 0)));
 
-/* There are no files: these functions fail, except closing. */
+/* There are no files: these functions fail, except fclose and setvbuf with _IONBF. */
 int remove(const char *name);
 int rename(const char *from, const char *to);
 FILE *fopen(const char *__restrict name, const char *__restrict mode);

@@ -26,7 +26,7 @@ from toolchain.optimise import bit_patterns
 from toolchain.optimise.combine import users_of
 from toolchain.select.state import MEMORY_BARRIERS
 
-MAX_TREE = 24  # operations in the value of a store; the front end needs at most 12 for a bit-field of itself
+MAX_TREE = 24  # maximum number of operations in a stored value; a bit-field set from itself has at most 12
 
 IsNear = Callable[[str], bool]
 """Function that returns whether the variable with a name is in near memory."""
@@ -124,7 +124,7 @@ def _tree_of(b: Block, store: Instr, users: dict[int, list[Instr]]) -> ValueTree
 
 
 def _forget(f: Function, removed: set[int]) -> None:
-    """Remove the values of debug records that are computed no more."""
+    """Remove the values of debug records that are no longer computed."""
     for record in f.dbg_records:
         if id(record.value) in removed:
             record.value = None
@@ -175,7 +175,7 @@ def _change(v: Value, p: Value) -> BitChange | None:
 
 
 def _one_bit(load: Instr, kept: int, flipped: int, steps: list[Instr]) -> BitChange | None:
-    """Return the BitChange of `steps`, applied to load & kept ^ flipped; None if they change not exactly one bit."""
+    """Return the BitChange of `steps`, applied to load & kept ^ flipped; None unless they change exactly one bit."""
     ones = (1 << load.type.bits) - 1
     for step in steps:
         k = _constant(step)

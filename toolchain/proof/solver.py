@@ -20,7 +20,7 @@ class Undecided(Exception):
 
 
 class Refuted(Exception):
-    """Code and IR differ for every input that satisfies `conditions`, or (None) the conditions of the path."""
+    """Code and IR differ for every input that satisfies `conditions`; None: the conditions of the path."""
 
     def __init__(self, what: str, conditions: Sequence[Term] | None = None) -> None:
         super().__init__(what)

@@ -20,7 +20,7 @@ from toolchain.mir.operands import FrameSlot, Imm, Mem, Operand
 
 FRAME_POINTER_BYTES = 900  # maximum bytes of locals without LNK; the greatest literal of ADD #lit10 is 1023
 PROBE_REACH = 1022  # largest word offset of [Wn+lit] (isa.md §3)
-PROBE_BYTES = 8  # -fstack-check probes frames of more bytes (kernel.md §4)
+PROBE_BYTES = 8  # -fstack-check probes frames of more than this number of bytes (kernel.md §4)
 USES_STACK = re.compile(r"\b(?:push|pop|lnk|ulnk|w15|sp)\b", re.IGNORECASE)
 REPEATS = {"repmov", "repfill", "repclr", "div.s", "div.u", "div.sd", "div.ud"}
 
