@@ -111,7 +111,7 @@ SETS_UP = re.compile(
 @pytest.mark.parametrize("app", ["clustering", "hello", "processors", "selftest", "spi"])
 def test_no_application_drops_the_result_of_a_call_that_sets_it_up(app: str) -> None:
     """Applications check the results of their set-up calls: a failed subscription leaves a robot without reaction.
-    Listing 1 has the paper's text, which does not."""
+    Listing 1 has the paper's text, which does not check them."""
     for source in (FIRMWARE / "apps" / app).glob("*.c"):
         assert not SETS_UP.findall(source.read_text()), source
 

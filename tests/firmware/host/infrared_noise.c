@@ -52,7 +52,7 @@ typedef struct {
     uint8 payload[FRAME_PAYLOAD];
 } text;
 
-static text said[SAID]; /* of late */
+static text said[SAID]; /* the last ones */
 static unsigned talk;
 /* Steps in which the receiver may still hold parts of a frame with more errors than are corrected, or of a jump of the
  * ambient light: its CRC may match by chance. */

@@ -106,7 +106,7 @@ def test_a_program_survives_its_text() -> None:
 
 @pytest.mark.slow
 def test_random_programs_agree(built: Path) -> None:
-    """Programs that the commit determines return, call and leave the same on the kernel and on the model."""
+    """Programs that the commit determines have the same results, callbacks and final state on kernel and model."""
     assert not differences(Kernels(built / "interpreter"), random_programs(base_seed(), PROGRAMS))
     shared = random_programs(base_seed(), PROGRAMS // 6, remote=True)
     assert not differences(Kernels(built / "remote" / "interpreter"), shared)
@@ -114,7 +114,7 @@ def test_random_programs_agree(built: Path) -> None:
 
 @pytest.mark.slow
 def test_drawn_programs_agree(built: Path) -> None:
-    """As above, with programs that hypothesis draws and shrinks."""
+    """Kernel and model agree on programs that hypothesis generates and shrinks."""
     kernels = Kernels(built / "interpreter")
 
     @settings(max_examples=60, deadline=None, suppress_health_check=list(HealthCheck))
@@ -127,7 +127,7 @@ def test_drawn_programs_agree(built: Path) -> None:
 
 @pytest.mark.slow
 def test_interrupts_at_known_boundaries_agree(built: Path) -> None:
-    """Programs whose interrupt comes at a boundary that only one order of the kernel's steps explains."""
+    """Kernel and model agree if the interrupt occurs at a boundary that only one order of steps explains."""
     assert not differences(Kernels(built / "interpreter"), at_known_boundaries())
 
 
@@ -172,7 +172,7 @@ def test_programs_agree_on_the_robot(image: Build) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("target", BOARDS)
 def test_programs_agree_in_qemu(target: str, tmp_path: Path) -> None:
-    """As above on the Cortex-M4 and on the RISC-V, also programs whose interrupt comes at a known boundary."""
+    """Programs agree with the model on the Cortex-M4 and the RISC-V, also with an interrupt at a known boundary."""
     image = make(target, "model", tmp_path, f"DEFINES={DEFINES_IN_QEMU}", apps=TARGET_APPS)
     in_qemu(target, image).close()  # skips if QEMU is missing
     machine = CpuInQemu(BOARDS[target], image)
@@ -181,6 +181,6 @@ def test_programs_agree_in_qemu(target: str, tmp_path: Path) -> None:
 
 
 def test_the_readme_states_every_planted_fault() -> None:
-    """The table in model/README.md has a number of programs for each."""
+    """The table in model/README.md states how many programs it took to find each planted fault."""
     text = (Path(__file__).parents[1] / "model" / "README.md").read_text()
     assert {name for name, _ in re.findall(r"\| ([^|]+) \| ([\d,]+) (?=\|)", text)} == FOUND_BY.keys()

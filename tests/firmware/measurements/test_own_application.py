@@ -91,7 +91,7 @@ def test_names_of_system_events_are_those_of_the_headers():
 
 @pytest.mark.parametrize("stack", [1400, 2800])
 def test_a_larger_stack_fails_the_check_with_its_row_and_line(changed, baseline, capsys, stack):
-    """Also if the thread no longer fits and the firmware stops at its start."""
+    """Row and line are named, also if the thread no longer fits and the firmware stops at the thread's start."""
     image = changed((".stack = 200", f".stack = {stack}"))
     capsys.readouterr()
     assert main(["footprint", image, "--seconds", "0.05", "--check", baseline]) == 1

@@ -35,7 +35,7 @@ def call(name: str, callers: str, failure: Any = False, blocks: bool = False) ->
 
 
 class Calls:
-    """State that decides whether a call is allowed, and what it may fail for."""
+    """State that decides whether a call is allowed and whether its allocations fail."""
 
     def __init__(self, sizes: Sizes, code: Code) -> None:
         self.sizes = sizes
@@ -78,12 +78,12 @@ class Calls:
         return self.isr_error if self.in_isr else self.handler_error if self.in_kernel else self.running.error
 
     def boundary(self) -> None:
-        """An interrupt may come here: the parts of a call before and after are done as a whole."""
+        """Let an interrupt occur here. The steps of a call between two boundaries are atomic."""
 
     # ---- Memory ----------------------------------------------------------------------------------------------------
 
     def allocate(self, size: int) -> bool:
-        """Take heap memory; False: there is none (a test makes allocations fail)."""
+        """Take heap memory; False: the program makes this allocation fail."""
         fails = not self.allocations_to_skip and self.allocations_to_fail > 0
         if fails:
             self.allocations_to_fail -= 1

@@ -20,7 +20,7 @@ from tests.firmware.model.state import Sizes
 HERE = Path(__file__).parent
 LATER_ISR = SCRIPTS - 1
 MOST_BOUNDARIES = 60
-"""Boundaries between two records that are tried for an interrupt that came there."""
+"""Maximum number of boundaries between two records that are tried as the place of an interrupt."""
 CONTEXT = 6
 """Records shown before the first difference."""
 
@@ -60,8 +60,8 @@ def executions(
 ) -> Iterator[tuple[Executor, list[Record]]]:
     """Yield the model's executions that may explain the records `seen`, each with its records.
 
-    They differ in where the interrupt within a call comes: at each of the model's boundaries between the two records of
-    `seen` between which the interrupt came. base: heap bytes in use when the program starts.
+    They differ in the boundary at which the interrupt within a call occurs. The records tell between which two of them
+    it occurred; each boundary of the model there is tried. base: heap bytes in use when the program starts.
     """
     came = next(((n, record[8]) for n, record in enumerate(seen) if record[0] == LATER_ISR), (-1, 0))
     for boundary in range(MOST_BOUNDARIES):
@@ -115,7 +115,7 @@ class Kernels:
         return any(self.check([program]))
 
     def shrunk(self, program: Program) -> Program:
-        """Return a smaller program that differs, too: no operation of it can be removed or made plainer."""
+        """Return a smaller program that differs, too, in which no operation can be removed or simplified."""
         again = True
         while again:
             again = False

@@ -307,7 +307,7 @@ class Executor:
         self.k.allocations_to_skip, self.k.allocations_to_fail = a, b
 
     def operations(self) -> dict[int, Callable[[Place, int, int, int], Any]]:
-        """Return what performs each operation on the model."""
+        """Return the function that performs each operation on the model."""
         k = self.k
         return {
             Code.START_KERNEL: lambda p, a, b, c: k.start_kernel(),

@@ -21,7 +21,7 @@ class Fault:
     name: str
     edits: tuple[tuple[str, str, str], ...]
     remote: bool = False
-    """It takes programs that share events."""
+    """Whether only programs that share events can find it."""
 
 
 RELEASES = """    if (os_release_mutexes != NULL) {
@@ -123,7 +123,7 @@ FAULTS = (
     _one("a timer drifts", TIMER, "(uint16)(t->due + t->period);\n", "(uint16)(clock_now() + t->period);\n"),
     _one("a service restarts for ever", SERVICE, "                s->restarts--;\n", "                ;\n"),
 )  # fmt: skip
-"""Those up to "an ISR gets the wrong error" stem from the kernel's history."""
+"""The faults up to "an ISR gets the wrong error" are former faults of the kernel."""
 
 
 FOUND_BY = named_texts("found_by.txt")

@@ -35,7 +35,7 @@ FAMILIES: dict[str, tuple[int, ...]] = {
     "motors": (Code.SEND_INT, Code.SEND, Code.MOTOR_SPEEDS, Code.UNSUBSCRIBE, Code.SUBSCRIBE),
     "memory": (Code.FAIL, Code.FAIL, Code.LOST, Code.STATISTICS, Code.START_PROCESS, Code.REGISTER, Code.SEND_INT),
 }  # fmt: skip
-"""Calls that are about the same matter. A program draws its calls from a few families."""
+"""Families of related calls. A program draws its calls from a few families."""
 REMOTE = (Code.SHARE, Code.SHARE, Code.ARRIVE, Code.ARRIVE, Code.ARRIVE, Code.ARRIVE, Code.REMOTE_STATISTICS,
           Code.SEND_INT, Code.SEND, Code.UNREGISTER, Code.REGISTER, Code.SUBSCRIBE)  # fmt: skip
 """Calls of programs that share events, for an interpreter with the infra-red link."""
@@ -46,7 +46,7 @@ IN_ISR = (Code.SEND_INT, Code.SEND_INT, Code.SEND_INT, Code.SEND, Code.NOTIFY, C
 PREFERRED = {Kind.CLEANUP: (Code.KILL, Code.KILL, Code.UNLOCK, Code.PUSH, Code.POP, Code.START_PROCESS),
              Kind.HANDLER: (Code.SEND_INT, Code.SEND_INT, Code.KILL, Code.READ, Code.UNREGISTER),
              Kind.CONDITION: (Code.KILL, Code.UNSUBSCRIBE_HANDLER, Code.SUBSCRIBE)}  # fmt: skip
-"""Calls that scripts of a kind make besides, because they change what runs."""
+"""Additional calls of scripts of a kind, because they change which code runs next."""
 ELSEWHERE = tuple(Code[name] for name in ("STATISTICS", "MOTOR_SPEEDS", "UNUSED_KERNEL_STACK", "SYSTEM_TIME", "SLEEP"))
 
 

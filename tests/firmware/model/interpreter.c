@@ -40,7 +40,7 @@ const uint16 interpreter_sizes[SIZES] = {
 static script scripts[SCRIPTS];
 static uint16 slots[SLOTS];
 static uint16 starts;
-static bool later_used; /* an interrupt within a call: its order with the parts of the call is not specified */
+static bool later_used; /* LATER was executed: the order of its interrupt and the call's steps is open */
 static sys_event_data *results[MOST_PIDS]; /* wait result by PID */
 
 static const uint16 events[] = {SYS_FIRST_USER_EVENT, SYS_FIRST_USER_EVENT + 1, SYS_FIRST_USER_EVENT + 8,
@@ -212,7 +212,7 @@ static uint16 wait(place *at, const operation *o, uint16 *extra)
     sys_event_data *data = o->code == WAIT_EVENT       ? Sys_Wait_for_Event(event)
                            : o->code == WAIT_CONDITION ? Sys_Wait_for_Condition(event, conditions[o->b])
                                                        : Sys_Wait_for_ConditionTimeout(event, conditions[o->b], o->c);
-    if (data == NULL && Sys_Get_LastError() == SYS_ERROR_CONTEXT) { /* refused: the thread still owns the one before */
+    if (data == NULL && Sys_Get_LastError() == SYS_ERROR_CONTEXT) { /* refused: the thread still owns the last result */
         return NOTHING;
     }
     *result_of(at) = data;

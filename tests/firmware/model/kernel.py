@@ -47,7 +47,7 @@ class Kernel(Remote):
         self.run_cleanups(thread)
 
     def free_thread(self, thread: Thread) -> None:
-        """Free a thread's memory, but the control block of a joinable one, which becomes a zombie; then report its
+        """Free a thread's memory, except the control block of a joinable one, which becomes a zombie; report its
         end."""
         period = self.sizes.period if thread.period is not None else 0
         if thread.stack == 0:  # a zombie that is killed

@@ -18,14 +18,14 @@ from tests.firmware.model.state import Error, Sizes
 
 T1IF, OS_WORK = 1 << 3, 0xFF
 DEFINES = "-U__OPTIMIZE__ -DSYS_HEAP=4400 -DSYS_DEFAULT_STACK=400"
-"""Stacks for the interpreter: without __OPTIMIZE__ the port gives the kernel a longer one."""
+"""Sizes for the interpreter: without __OPTIMIZE__ the port has a larger kernel stack."""
 PATIENCE = 3_000_000
-"""Tcy after which a program that ends neither by its records nor by idling has hung."""
+"""Tcy after which a program that has reached neither limit, of records or of idle times, has hung."""
 DEFINES_IN_QEMU = "-DSYS_DEFAULT_STACK=1024 -Wl,--wrap=hal_idle"
 HEAP, HEAP_IN_QEMU = 3500, 24_000
-"""Heap bytes beyond which a program is not compared: the model does not know which block fits where."""
+"""Heap bytes above which a program is not compared, because the model has no fragmentation."""
 OF_A_PORT = (Code.UNUSED_STACK, Code.UNUSED_KERNEL_STACK)
-"""Calls whose results depend on what a port leaves of its stacks."""
+"""Calls whose results depend on how much of its stacks a port leaves unused."""
 
 
 class Comparison:

@@ -10,16 +10,16 @@ from tests.firmware.model.waits import Waits
 
 LAST_EVENT, MOST_HOPS, MOST_BYTES = 8191, 7, 8
 QUEUE = 4
-"""Frames that wait while the link sends none."""
+"""Maximum number of waiting frames; the link sends none during a program."""
 SEQUENCES, WINDOW = 32, 16
-"""Sequence numbers of a robot, and how many behind its newest one are remembered."""
+"""Number of sequence numbers of a robot, and of those before its newest one that are recorded."""
 OWN = 5
 """This robot's number in programs."""
 
 
 @dataclass(slots=True)
 class Slot:
-    """A place for a shared event. It is free if the event of that number is not behind the slot's gate any more."""
+    """A place for a shared event. It is free if the slot's gate is no longer in front of the event of that number."""
 
     number: int = 0
     hops: int = 0
@@ -98,7 +98,7 @@ class Remote(Waits):
         return super().queue_message(number, payload)
 
     def arrive(self, number: int, hops: int, robot: int, sequence: int, payload: bytes) -> None:
-        """Interrupt: a frame with an event of another robot has arrived, from it or from a robot in between."""
+        """Interrupt: receive a frame with an event of another robot, from that robot or from one that forwards it."""
         if robot == OWN:
             self.count("duplicates")
         elif robot not in self.heard and len(self.heard) == self.sizes.remote_memory:

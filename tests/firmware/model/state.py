@@ -11,7 +11,7 @@ Handler = Callable[[int, int, "Message"], bool]
 """handler(pid, event, message): False unsubscribes the handler."""
 Condition = Callable[["Message"], bool]
 Code = Iterator[str]
-"""What a thread executes. It yields the reason for which it gives the CPU up: see `Threads.resume`."""
+"""Code of a thread. It yields a reason whenever it gives up the CPU: see `Threads.resume`."""
 
 
 class Error(IntEnum):
@@ -28,7 +28,7 @@ class State(IntEnum):
 
 @dataclass(frozen=True)
 class Sizes:
-    """Bytes and limits of a port, in the order in which the interpreter prints them."""
+    """Sizes in bytes and limits of a port, in the order in which the interpreter prints them."""
 
     step: int
     """Granularity of allocations."""
@@ -52,7 +52,7 @@ class Sizes:
     remote_memory: int
 
     def rounded(self, size: int) -> int:
-        """Return what an allocation of `size` bytes takes."""
+        """Return the heap bytes that an allocation of `size` bytes takes."""
         return -(-size // self.step) * self.step
 
 

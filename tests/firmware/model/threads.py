@@ -34,7 +34,7 @@ class Threads(Calls):
         self.newest_pid = 0
         self.scheduler: Scheduler = ROUND_ROBIN
         self.forced = False
-        """An eager scheduler shall choose again as soon as no critical section is open."""
+        """Whether an eager scheduler chooses again as soon as no critical section is open."""
         self.slice_over = False
         self.now = 0
         self.alarm: int | None = None
@@ -138,7 +138,7 @@ class Threads(Calls):
     # ---- Scheduling ------------------------------------------------------------------------------------------------
 
     def preempt(self) -> None:
-        """Let an eager scheduler choose as soon as possible; not after what handlers do, unless an ISR does it."""
+        """Let an eager scheduler choose as soon as possible; wake-ups and messages of handlers do not request it."""
         scheduler = self.scheduler
         if scheduler.eager and scheduler.pick is not None and (not self.in_kernel or self.in_isr):
             self.forced = True
@@ -222,7 +222,7 @@ class Threads(Calls):
             self.dispatch()
 
     def resume(self) -> None:
-        """Run the threads for ever. A thread comes back when it yields, blocks, is preempted, retires or ends."""
+        """Run the threads for ever. A thread returns here when it yields, blocks, is preempted, retires or ends."""
         while True:
             self.boundary()
             if (self.forced or self.slice_over) and not self.depth and self.started:

@@ -15,7 +15,7 @@ DATA_MASK = 0xFFFF
 
 
 class EmulatedKilobot:
-    """One robot of a swarm, or alone."""
+    """A robot, alone or in a swarm."""
 
     pointer = 2
 

@@ -83,7 +83,7 @@ def test_a_cpu_without_a_limit_stops_when_a_stack_has_overflown(target: str, ove
 
 
 def last_words(target: str, image: Path) -> bytes:
-    """Return what a system said that stops by itself."""
+    """Return the UART output of a system that stops by itself."""
     if target == "qemu_virt":
         try:
             status, said = qemu.run(BOARDS[target], image)
@@ -224,9 +224,9 @@ int main(void)
 
 @pytest.mark.parametrize("target", ["epuck", "kilobot", *BOARDS])
 def test_a_superfluous_request_to_switch_is_harmless(target: str, image: Build, tmp_path: Path) -> None:
-    """A thread continues after a request to switch that nothing needs (hal_cpu.h: hal_slice_force).
+    """A thread continues after a superfluous request to switch (hal_cpu.h: hal_slice_force).
 
-    An interrupt that sets round robin leaves one if it comes while the kernel requests a switch.
+    An interrupt that sets round robin while the kernel requests a switch leaves such a request.
     """
     (tmp_path / "superfluous").mkdir()
     (tmp_path / "superfluous" / "main.c").write_text(SUPERFLUOUS)

@@ -94,7 +94,7 @@ int main(void)
 """
 KINDS = ("illegal", "misaligned", "jump", "load", "store", "break", "call", "stack")
 PLACES = {"before init": 0, "before start": 0, "thread": 1, "section": 1, "handler": 1, "interrupt": 1}
-"""Places of the fault, and the thread that is reported; that of a handler or interrupt is the interrupted one."""
+"""Places of the fault, with the reported PID: in a handler or interrupt that of the interrupted thread."""
 WRAPPED = "DEFINES=-Wl,--wrap=board_tick,--wrap=board_failsafe"
 
 
@@ -138,7 +138,7 @@ def test_a_fault_is_reported_wherever_it_comes(faulty: tuple[Path, Symbols]) -> 
             assert pc == (0 if kind == "jump" else symbols[f"at_{kind}"])
 
     def is_taken(kind: str, place: str) -> bool:
-        """Whether an interrupt can come there."""
+        """Whether an interrupt can occur at this place."""
         return kind != "stack" or place in ("thread", "section", "handler")
 
     check_all(check, [(kind, place) for kind in KINDS for place in PLACES if is_taken(kind, place)])

@@ -17,7 +17,7 @@ static void keep(void)
     memcpy(before.versions, kept_versions, sizeof kept_versions);
 }
 
-/* The robot as it was kept, after a reset. */
+/* Restores the robot kept in `before`, after a reset. */
 static void restore(void)
 {
     memcpy(cells, before.cells, sizeof cells);
@@ -112,7 +112,7 @@ static long forge_keys(void)
     return 8 * SYS_ASCON_BYTES + 1;
 }
 
-/* Versions 2 (running), 5 (stored), then the beginning of a version that never comes, which erases 5. */
+/* Versions 2 (running) and 5 (stored); then a transfer that never completes begins and erases 5. */
 static long replay(void)
 {
     static const int older[] = {0, OLD, 4, 6, 8};

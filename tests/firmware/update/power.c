@@ -179,7 +179,7 @@ static cells empty(void)
 }
 
 /* Cuts power at operation `first` of an update from `old` (0: firmware alone) to `old` + 1, then at operation `second`
- * of the next start. Returns the number of power failures that occurred: short operations sequences have fewer. */
+ * of the next start. Returns the number of power failures that occurred: short sequences have fewer. */
 static int fails_twice(const cells *before, uint16 old, int first, int first_mode, int second, int second_mode)
 {
     volatile bool is_cut = false, is_cut_again = false;
@@ -270,7 +270,7 @@ static void roll_back(void)
     check(start() == 3, "and that version taken again");
 }
 
-/* The damage of authenticated updates is a forger's, who knows the CRC. */
+/* Damage to authenticated updates is made by a forger, who corrects the CRC. */
 static void forge_crc(sys_update *facts, uint8 (*rows)[HAL_UPDATE_ROW])
 {
     facts->crc = 0xFFFFFFFFu;

@@ -33,7 +33,7 @@ RUN, STORES = 0x00F800, 0x016800
 OPERATIONS = 11
 """Number of flash and EEPROM operations of an update.
 
-Head and flags erased, a row and the head erased and written, activated, a trial, the row copied, confirmed.
+Erase head and flags; erase and write a row and the head; activate; count a trial; copy the row; confirm.
 """
 MIDDLE = 20_000
 """Tcy after the start of an operation at which power fails; an operation takes 29,491 Tcy."""

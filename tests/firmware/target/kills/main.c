@@ -192,7 +192,7 @@ static void check_options(void)
 {
     uint16 before = rounds;
     expect(Sys_Lock_MutexTimeout(&mutex, SETTLE_MS) && Sys_Unlock_Mutex(&mutex));
-    for (uint8 i = 0; i < 2; i++) { /* none is pushed still */
+    for (uint8 i = 0; i < 2; i++) { /* fails if one is still pushed */
         expect(Sys_Push_Cleanup(&cleanups[i], clean, NULL) && Sys_Pop_Cleanup(false));
     }
     Sys_Sleep(SETTLE_MS);
