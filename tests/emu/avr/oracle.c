@@ -1,6 +1,6 @@
 /* The AVR core beside simavr: single instructions with random operands and states, and whole programs in lock step.
  *
- * The test compiles this file behind the declaration of `struct avr`; the core's functions come as pointers. */
+ * The test compiles this file after the declaration of `struct avr` and passes the core's functions as pointers. */
 #include <sim_avr.h>
 #include <sim_core.h>
 #include <stdio.h>

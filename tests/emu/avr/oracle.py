@@ -60,7 +60,7 @@ class Pair:
         assert self._handle
 
     def row(self, row: Row, tries: int, seed: int) -> str:
-        """Compare random words and states of a row. Return a description of the first difference, or nothing."""
+        """Compare random words and states of a row. Return a description of the first difference, or ""."""
         words = legal_words(row)
         listed = (ctypes.c_uint16 * len(words))(*words)
         done = self._library.pair_row(self._handle, listed, len(words), tries, seed)
@@ -71,7 +71,7 @@ class Pair:
         self._library.pair_load(self._handle, flash, len(flash))
 
     def lockstep(self, steps: int) -> str:
-        """Execute instructions in both. Return a description of the first difference, or nothing."""
+        """Execute instructions in both. Return a description of the first difference, or ""."""
         return "" if self._library.pair_lockstep(self._handle, steps) == steps else self.told
 
     @property

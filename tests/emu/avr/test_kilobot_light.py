@@ -99,7 +99,7 @@ def test_three_hundred_pulses_at_the_same_time(build: Build) -> None:
 
 
 def test_a_robot_at_rest_takes_any_number_of_voltages(build: Build) -> None:
-    """The light of a place may change while a robot has no power or has stopped; the last voltage counts."""
+    """An input voltage may change any number of times while a robot is off or stopped; the last one is converted."""
     image = build("int main(void) { ADMUX = 7, ADCSRA = 0xC7; while (ADCSRA & 0x40) {} for (;;) {} }")
     swarm = KilobotSwarm([KilobotSetup(image, on_at=0.5), KilobotSetup(image)])
     swarm.stop(1)

@@ -12,10 +12,10 @@ from emu.boards.kilobot.swarm import KilobotSetup, KilobotSwarm
 from tests.emu.avr.conftest import Build
 
 PIECE = 3
-"""Cycles of a call in which nothing can be skipped: a round of the shortest loop takes as many."""
+"""Cycles of a call that is too short for skipping: an iteration of the shortest loop takes as many."""
 SEARCH = {"until", "deadline", "next_due", "skipped", "touched", "counts_until", "tracing", "round", "resting",
           "log_cycle", "log_register", "log_value"}  # fmt: skip
-"""Fields of the calls and of the search for rounds."""
+"""Fields of the state that control native calls and the search for repeating iterations; not compared."""
 
 POLLING = """
     volatile uint8_t ticks; uint8_t last, rounds;
@@ -123,7 +123,7 @@ def test_waiting_robots_are_not_run_in_turns(build: Build) -> None:
 
 
 def test_a_delay_does_not_stop_the_search(build: Build) -> None:
-    """A delay that is no round does not count as failed search: the loop behind it is skipped at once."""
+    """A delay that never repeats exactly does not count as a failed search: the loop after it is skipped at once."""
     m = Atmega328p(build("""
         #include <util/delay.h>
         volatile uint8_t ticks, seen; volatile uint16_t ms;
@@ -140,7 +140,7 @@ def test_a_delay_does_not_stop_the_search(build: Build) -> None:
 
 
 def test_a_fed_watchdog_does_not_bite(build: Build) -> None:
-    """A loop that waits and resets the watchdog in each round is no round that repeats up to the time-out."""
+    """A waiting loop that resets the watchdog in each iteration is not skipped up to the time-out."""
     m = Atmega328p(build("""
         #include <avr/wdt.h>
         volatile uint8_t flag;

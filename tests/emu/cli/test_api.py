@@ -139,7 +139,7 @@ def test_register_hooks_are_many_and_can_be_removed(load, engine):
 
 @pytest.mark.parametrize("name", ["SR", "ACCAL", "ACCAU", "RCOUNT", "CORCON"])
 def test_a_register_hook_hears_reads_of_the_core_registers_in_native_code(load, name):
-    """Native code keeps some of them in variables."""
+    """Hooks on core registers are called, although native code keeps some of these registers in variables."""
     heard = {}
     for engine in ("plain", "jit"):
         machine = load(SPIN.replace("mov w0, 0x800", f"mov {{{name}}}, w1"), engine=engine, board=None)

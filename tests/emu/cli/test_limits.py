@@ -1,4 +1,4 @@
-"""Runs end with an error where their output has no room, and scripts of the debugger where their time is over."""
+"""A run whose output has no room ends with an error; a debugger script ends when its time limit is reached."""
 
 from __future__ import annotations
 

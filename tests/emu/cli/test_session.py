@@ -50,7 +50,7 @@ def test_slices_do_not_affect_the_run(monkeypatch, length, engine):
 
 
 def test_the_first_slice_ends_before_the_translator_is_imported():
-    """Output of the first cycles does not wait for it."""
+    """The output of the first slice does not wait for the import of the translator."""
     assert sessions.FIRST_SLICE <= WARM_UP
 
 

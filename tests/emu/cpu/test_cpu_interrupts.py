@@ -347,7 +347,7 @@ def test_idling_beside_a_timer_that_interrupts_nobody_halts(engine: str) -> None
 
 @pytest.mark.parametrize("part", [70_000, 999_999, 30_000_000])
 def test_the_cycle_of_a_halt_does_not_depend_on_the_parts_of_a_run(engine: str, part: int) -> None:
-    """The next event, the period of a timer with a prescaler of 256, is due after 16.8 million cycles."""
+    """Any division of the run halts at the same cycle; the timer's next event is due after 16.8 million cycles."""
     rig = Rig("mov w0, 0x102\nmov w1, 0x104\npwrsav #1\nend: nop", engine, w0=0xFFFF, w1=0x8030)
     stop = rig.machine.run(cycles=part)
     while stop.reason == "limit":

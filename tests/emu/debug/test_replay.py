@@ -13,7 +13,7 @@ START = 0x200
 
 @pytest.mark.parametrize(("word", "is_write"), [(0x780011, False), (0x780880, True)], ids=["load", "store"])
 def test_the_first_instruction_of_a_replay_may_be_the_faulty_one(word: int, is_write: bool) -> None:
-    """The bad access of a load is a read, although no instruction of the replay stores; that of a store is a write."""
+    """The bad access of a load is a read, that of a store a write, also in a replay of this instruction alone."""
     machine = Machine(engine="plain")
     machine.program.put(START, word)
     machine.reset("POR")
@@ -25,7 +25,7 @@ def test_the_first_instruction_of_a_replay_may_be_the_faulty_one(word: int, is_w
 
 
 def test_replayed_resets_are_no_loop_of_resets() -> None:
-    """Without this, a replay of some resets would end the run, because they were counted once already."""
+    """Resets count once, however often they are replayed; otherwise a replay would end as a loop of resets."""
 
     def machine() -> Machine:
         made = Machine(engine="plain")
@@ -51,7 +51,7 @@ def test_replayed_resets_are_no_loop_of_resets() -> None:
 
 @pytest.mark.parametrize("register", ["ADCBUF0", "ADCON1", "PORTF"])
 def test_a_look_at_a_register_in_the_past_keeps_the_recording(register: str) -> None:
-    """The ADC and the levels of a UART's TX pin are computed at a look, which counted as a change of the machine."""
+    """Reading the ADC or a TX pin computes its value, which must not count as a change of the machine."""
     machine = Machine(engine="plain")
     machine.program.put(0, 0x37FFFF)  # bra to itself
     machine.reset("POR")

@@ -50,7 +50,7 @@ def image(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_the_object_is_shown_while_the_function_fills_it(image: Path) -> None:
-    """Its location is the address that the caller passed, as long as the function needs that address."""
+    """The struct's location is the address that the caller passed, as long as the function needs that address."""
     machine = emu.load(image, board=None)
     shown = []
     for _ in range(3):

@@ -94,7 +94,7 @@ def test_the_root_is_searched_first(tmp_path):
 
 
 def test_listings_show_the_kernels_sources(image, tmp_path, monkeypatch, capsys):
-    """Wherever the command runs, as for a kernel from a wheel; the stand-in's code is in line 4 of `clock.c`."""
+    """The kernel's sources are found from any folder, also those of a wheel; the code is in line 4 of `clock.c`."""
     monkeypatch.chdir(tmp_path)
     fourth = (ROOT / "firmware/openswarm/kernel/clock.c").read_text().splitlines()[3]
     assert main(["disasm", str(image), "--source", "--from", "tick"]) == 0

@@ -125,7 +125,7 @@ def slices(machine: Machine, until: int, cycles: int) -> None:
     ("plain", CYCLES, 1), ("jit", CYCLES, 1), ("jit", 501, 1), ("jit", CYCLES, 9),
 ])  # fmt: skip
 def test_changes_by_stores_interrupts_and_sleep(path: Path, engine: str, cycles: int, threshold: int) -> None:
-    """With a threshold of 9, native boundaries enter handlers that have no native code yet, also behind a hook."""
+    """The log equals single steps, also with a threshold of 9, at which handlers have no native code yet."""
     stepping, machine = machine_of(path, "plain"), machine_of(path, engine)
     if isinstance(machine.runner, JitEngine):
         machine.runner.threshold = threshold
@@ -143,7 +143,7 @@ def test_changes_by_stores_interrupts_and_sleep(path: Path, engine: str, cycles:
 
 @pytest.mark.parametrize("threshold", [1, 9])
 def test_a_change_by_a_hook_belongs_to_the_boundary_before_the_instruction(path: Path, threshold: int) -> None:
-    """Interpreted and native instructions log it alike, before they run. With a threshold of 9, handlers are cold."""
+    """A hook's change is logged before the hooked instruction, interpreted (handlers at threshold 9) or native."""
     found = []
     for engine in ("plain", "jit"):
         machine, writes = machine_of(path, engine), list[tuple[int, int, int, int, int]]()
@@ -215,7 +215,7 @@ def test_a_boundary_with_two_interrupts_is_logged_once(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("seed", range(6))
 def test_random_firmware(seed: int) -> None:
-    """The same holds for random instructions of every row with traps, REPEAT, DO and interrupts."""
+    """Random instructions of every row, with traps, REPEAT, DO and interrupts, give the same log in each engine."""
     generator = random.Random(seed)
     places = [generator.randrange(0x800, 0xA00) & ~1 for _ in range(4)]
     watched: list[Watched] = ["ipl", "asleep", *(WatchedNumber(at, generator.choice((1, 2, 4))) for at in places)]
@@ -303,7 +303,7 @@ PLACED = (("deep", "W15 > 0x830 && ticks > 3"), ("deep", "W0 == 1"), ("_T2Interr
 
 @pytest.mark.parametrize("until", CONDITIONS)
 def test_a_run_ends_when_a_condition_holds(path: Path, until: str) -> None:
-    """It ends after the same instruction as with a function that is called after every instruction."""
+    """A run ends after the same instruction as with a function that is called after every instruction."""
     native, plain, stepping = machine_of(path, "jit"), machine_of(path, "plain"), machine_of(path, "plain")
     stops = [machine.run(cycles=CYCLES, until=until) for machine in (native, plain)]
     stops.append(stepping.run(cycles=CYCLES, until=lambda: bool(stepping.var(until))))

@@ -242,7 +242,7 @@ def test_objects_are_compressed() -> None:
 
 @pytest.mark.parametrize("stored", [b"", b"\x01\0\0\0", b"\0\0\0\0\x7fELF"])
 def test_an_object_of_another_form_is_compiled_again(stored: bytes, compiler: Compiler) -> None:
-    """A process whose sources change while it runs may store objects that a later process does not understand."""
+    """An object in an unknown format is compiled again: another version of the sources may have stored it."""
     compiler.cache.put("a", stored)
     assert compiler.lookup("a") is None
     assert compiler.compile_now(IR.format(1), 0, "a").address

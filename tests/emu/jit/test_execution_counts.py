@@ -64,7 +64,7 @@ def test_a_program_with_interrupts_loops_and_polls(image: Path) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(4))
 def test_random_firmware(seed: int) -> None:
-    """The same holds for random instructions of every row with traps, REPEAT, DO and interrupts."""
+    """Random instructions of every row, with traps, REPEAT, DO and interrupts, give equal counts."""
     found = []
     for engine in ("plain", "jit"):
         machine = Machine(engine=engine)

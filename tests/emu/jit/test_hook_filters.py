@@ -119,7 +119,7 @@ def test_a_breakpoint_of_the_debugger_counts_its_hits(image: Path, engine: str) 
 
 @pytest.mark.parametrize("name", ["level", "mask", "letter"])
 def test_a_data_breakpoint_stops_after_every_write(image: Path, name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """It stops in the same cycles as by single steps, also at writes that leave the value unchanged."""
+    """A data breakpoint stops in the same cycles as single steps, also at writes that leave the value unchanged."""
     results = []
     for engine, is_logged in (("jit", True), ("plain", True), ("plain", False)):
         monkeypatch.setattr(debuggee, "can_log_writes", can_log_writes if is_logged else lambda *_: False)

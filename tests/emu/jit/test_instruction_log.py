@@ -112,7 +112,7 @@ def test_a_program_with_interrupts_idle_and_a_reset(path: Path, engine: str, sli
 
 @pytest.mark.parametrize("seed", range(6))
 def test_random_firmware(seed: int) -> None:
-    """The same holds for random instructions of every row with traps, REPEAT, DO and interrupts."""
+    """Random instructions of every row, with traps, REPEAT, DO and interrupts, give equal traces."""
     image = load_image(HELLO)
     texts, states = [], []
     for engine in ("stepped", "jit"):

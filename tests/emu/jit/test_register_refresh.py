@@ -98,7 +98,7 @@ def test_engines_render_the_same_lines_and_leave_the_same_state(program: str, in
 
 
 def test_the_list_of_refreshed_instructions_ends_with_zero() -> None:
-    """More instructions than the list holds, and one twice: the host program that reads the list finds its end."""
+    """The list ends with 0 for the host program, also after more instructions than fit, one of them twice."""
     runner = machine("jit", "nop", []).runner
     for address in (2, *range(2, 8 * FRESH_ROOM, 2)):
         runner._remember_refresh(address)

@@ -136,7 +136,7 @@ def test_pixel_sources_are_called_for_read_lines_only(robot):
 
 
 def test_a_look_at_the_pixel_bus_asks_no_source_and_changes_nothing(robot):
-    """A source may draw random numbers: a look of a tool would change the rest of the trial."""
+    """A tool's read of the pixel bus calls no pixel source, whose random numbers would change the rest of the trial."""
     asked = []
 
     def pixels(y, columns, cycle):
@@ -156,7 +156,7 @@ def test_a_look_at_the_pixel_bus_asks_no_source_and_changes_nothing(robot):
 
 
 def test_a_look_at_the_pixel_bus_sees_a_still_picture(robot):
-    """The picture of a file has no state: a look gives the byte that an instruction would read."""
+    """A tool's read of a still picture, which has no state, returns the byte that an instruction would read."""
     robot.configure(po6030())
     robot.board.camera.show(scene())
     robot.at(robot.board.camera.scan.href(60, 1) + 5)
