@@ -1,4 +1,4 @@
-"""Experiments with Kilobots: their metrics on made samples, and the firmware of each for some seconds."""
+"""Experiments with Kilobots: their metrics on constructed samples, and the firmware of each for some seconds."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def test_hops_count_the_shortest_path() -> None:
 
 
 def test_the_spread_of_blinks_is_a_circular_arc() -> None:
-    """Blinks before and after the end of a period are close to each other; without a blink of each there is none."""
+    """Blinks around the end of a period are close to each other; the spread is nan until every robot has blinked."""
     tick = 0.032768
     blinks = [LedEvent(0, 1.0, 21), LedEvent(0, 1.1, 0), LedEvent(1, 1.0 + 48 * tick, 21)]
     made = samples("blinking", [[(0.0, 0.0), (4.0, 0.0)]] * 4, *blinks)
@@ -78,7 +78,7 @@ def test_a_gradient_forms(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_a_planet_orbits_and_a_robot_follows_an_edge(tmp_path: Path) -> None:
-    """The planet keeps 60 mm within 10 mm; the mover keeps 50 mm from the nearest robot and comes around."""
+    """The planet stays at 60 mm within 10 mm, the edge follower at 50 mm within 12 mm; both go half a round."""
     orbit = ran("orbit", 40.0, tmp_path / "orbit").series
     late = 10 * orbit.curves["distance"][orbit.times > 20]
     assert np.abs(late - 60).max() < 10
