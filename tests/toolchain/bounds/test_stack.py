@@ -95,7 +95,7 @@ THREE = (
 
 
 def test_a_thread_needs_its_stack_and_that_of_interrupts(image, tmp_path, capsys, monkeypatch):
-    """The one number of a thread includes return address and interrupts; that of an interrupt its entry of 4 bytes."""
+    """The figure of a thread includes return address and interrupts; that of an interrupt, 4 bytes of entry."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "x.elf").write_bytes(executable_bytes(image(START + THREE).linked.image))
     assert main(["bounds", "x.elf", "--thread", "blinker", "--json"]) == 0
@@ -190,7 +190,7 @@ def test_unknown_stack_pointers_and_unbalanced_returns_are_reported(image):
 
 
 def test_assembly_that_shares_w8_to_w14_is_executed_with_their_changes(image):
-    """A routine that changes W9 without saving it changes it for its callers: here, whether they use their stack.
+    """A routine that changes W9 without saving it changes W9 of its callers, which here decides whether they use stack.
 
     `next` moves the pointer W9; only the second byte of the text leads to the deep path.
     """

@@ -14,7 +14,7 @@ from toolchain import cli
 PROGRAMS = Path(__file__).parent
 SOURCES = sorted(path.name for path in PROGRAMS.glob("*.cpp"))
 MODES = [("-Os", "-fno-lto"), ("-O0", "-flto"), ("-O2", "-fno-lto"), ("-O0", "-fno-lto"), ("-O2", "-flto")]
-"""Modes beside -Os of the whole program, of which each program is built in one that the commit determines."""
+"""Modes besides -Os of the whole program; each program is built in one of them, which the commit determines."""
 
 
 def compiled(source: Path, folder: Path, *options: str) -> int:

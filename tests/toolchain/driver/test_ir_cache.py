@@ -37,7 +37,7 @@ class Compiled:
         (folder / "early").mkdir()
 
     def write(self, name: str, text: str) -> None:
-        """Write a file that is older than the run, as a file is that a user has saved before the build."""
+        """Write a file with a time stamp before the run, like a file that a user saved before the build."""
         path = self.folder / name
         path.parent.mkdir(exist_ok=True, parents=True)
         path.write_text(text)
@@ -59,7 +59,7 @@ def compiled(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Compiled:
 
 
 def test_only_changed_files_are_compiled(compiled: Compiled) -> None:
-    """A changed source, header or flag, and a header that clang finds earlier; the image is that of a full build."""
+    """Changed sources, headers and flags, and headers found earlier, cause compilation; images equal full builds."""
     first = compiled()
     assert first[0] == BOTH
     assert compiled() == ([], first[1])
@@ -102,7 +102,7 @@ def test_a_file_that_varies_or_has_warnings_is_compiled_each_time(compiled: Comp
 def test_a_new_file_that_clang_finds_first_is_compiled(
     compiled: Compiled, monkeypatch: pytest.MonkeyPatch, options: list[str], source: str, found: str, new: str
 ) -> None:
-    """Forced includes, folders with a slash at the end or a dot before, and folders of the environment."""
+    """Cases: forced includes, folders with a final slash or a leading dot, and folders of environment variables."""
     monkeypatch.chdir(compiled.folder)
     monkeypatch.setenv("CPATH", "first:by_environment")
     for folder in ("early", "first"):

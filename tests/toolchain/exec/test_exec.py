@@ -16,7 +16,7 @@ from tests.toolchain.c_programs import FrontEndOnce, build, run
 
 FOLDER = Path(__file__).parent
 MODES = ("-O0", "-O1", "-Os -fno-lto", "-O2", "-O1 -fno-lto")
-"""Modes beside -Os, of which every second file is built in one; the commit determines the files and their modes.
+"""Modes besides -Os. Every second file is built in one of them; the commit determines the files and their modes.
 
 With -fno-lto files are compiled separately: calls are not inlined, so that aliasing effects of functions show.
 """

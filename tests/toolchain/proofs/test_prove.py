@@ -146,7 +146,7 @@ def code_of(text: str) -> dict[str, str]:
 
 @pytest.mark.slow
 def test_right_code_is_proved() -> None:
-    """Every function of the sample is proved at -Os, and at another level each whose code differs there.
+    """Every function of the sample is proved at -Os, and those with other code at a second level are proved there.
 
     The campaign `fuzz_prove` proves functions of random programs.
     """
