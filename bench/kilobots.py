@@ -1,4 +1,4 @@
-"""Speed of emulated Kilobots: a crowd on a grid of 33 mm in which each robot receives from up to 20 others.
+"""Speed of emulated Kilobots: a swarm on a grid of 33 mm in which each robot receives from up to 20 others.
 
     python bench/kilobots.py [--image FILE.elf] [--robots 1 10 100] [--seconds 4] [--gap 33] [--reach 82]
 

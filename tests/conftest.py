@@ -38,7 +38,7 @@ def pytest_configure(config: pytest.Config) -> None:
         signal.signal(signal.SIGINT, signal.default_int_handler)
     config.pluginmanager.register(WatchdogPlugin(), "watchdog")
     if not hasattr(config, "workerinput"):
-        # Where the environment turns compiled modules off, the child processes of a run still share them.
+        # If the environment turns byte code files off, the child processes of a run share a temporary folder of them.
         if os.environ.pop("PYTHONDONTWRITEBYTECODE", None):
             compiled = os.environ["PYTHONPYCACHEPREFIX"] = tempfile.mkdtemp(prefix="pycache-")
             config.add_cleanup(lambda: shutil.rmtree(compiled, ignore_errors=True))

@@ -1,4 +1,4 @@
-"""SECURITY.md: every line of its table of inputs names a test that exists; tests of what has no other place."""
+"""SECURITY.md: every line of its table of inputs names a test that exists; tests of inputs without a module."""
 
 from __future__ import annotations
 

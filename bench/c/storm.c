@@ -1,4 +1,4 @@
-/* Interrupt every PERIOD + 1 Tcy (default 100 us) over a computing main loop; the handler clears its flag and calls. */
+/* Interrupt every PERIOD + 1 Tcy (default 100 us) over a computing main loop; the handler calls a function. */
 #include <p30F6014A.h>
 #include <stdint.h>
 

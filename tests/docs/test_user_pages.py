@@ -30,7 +30,7 @@ def test_every_message_of_the_troubleshooting_page_exists() -> None:
 
 
 def test_every_numbered_source_is_in_the_bibliography() -> None:
-    """Pages that cite `[10]` or `Eq. (1)`, `Eq. (2)` count as the paper does; the bibliography explains each number."""
+    """Pages cite `[10]` and `Eq. (1)` by the paper's numbers; the bibliography explains each number."""
     known = (DOCS / "bibliography.md").read_text(encoding="utf-8")
     cited: set[str] = set()
     for page in (*DOCS.glob("*.md"), *(ROOT / "arena").rglob("*.py")):

@@ -49,7 +49,7 @@ def test_it_has_its_name_everywhere_and_no_hole(project):
 @pytest.mark.slow
 def test_make_builds_and_its_test_finds_what_is_wrong(project):
     """The project's test of the greeting fails if the firmware is faulty; a mistake in the C source is reported in the
-    format of VS Code's problem matcher. The first steps (test_wheel.py) run all tests of the right firmware."""
+    format of VS Code's problem matcher. The first steps (test_wheel.py) run all tests of the correct firmware."""
     source = project / "src" / "main.c"
     right = source.read_text()
     source.write_text(right.replace("Sys_Sleep(1000)", "Sys_Sleep(900)", 1))

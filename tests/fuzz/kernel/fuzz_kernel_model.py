@@ -2,8 +2,9 @@
 
 Usage: `python tests/fuzz/kernel/fuzz_kernel_model.py [--batches N] [--seconds S] [--planted]`. Each seed makes a batch
 of 500 programs of at most 60 calls, made by threads, handlers, conditions, cleanups and interrupts, with failing
-allocations (tests/firmware/model). Both must return, call and leave the same. The campaign prints the shrunk program
-that differs. With --planted it plants faults in copies of the kernel instead and states how many programs found each.
+allocations (tests/firmware/model). Results, callbacks and final state must be equal. The campaign prints the shrunk
+program that differs. With --planted it plants faults in copies of the kernel instead and states how many programs found
+each.
 """
 
 from __future__ import annotations
