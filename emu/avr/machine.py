@@ -30,7 +30,7 @@ BOOT_START: Final = 0x3800
 """Word address of the 4 KB boot section (fuses BOOTSZ = 00)."""
 SPL, UDR0 = ADDRESSES["SPL"], ADDRESSES["UDR0"]
 _CHUNK: Final = 4_000_000
-"""Cycles per native call. A call holds the interpreter lock."""
+"""Maximum number of cycles per native call, because a call holds the GIL."""
 _FAULTS: Final = {
     1: "illegal instruction {address:#06x}",
     2: "load from {address:#06x}, behind the end of RAM at 0x8ff",

@@ -47,7 +47,7 @@ input."""
 
 
 class TimeLimitReached(BaseException):
-    """The time limit of the session. It is no Exception, because the server answers those as failed requests."""
+    """The session has reached its time limit. It is no `Exception`: the server answers those as failed requests."""
 
 
 def parser() -> Parser:

@@ -77,7 +77,7 @@ class Debuggee:
 
     @property
     def _kilobot(self) -> DebuggedKilobot:
-        """The machine, if its processor has no native instruments."""
+        """The machine as a Kilobot. Only a Kilobot's processor has no native instruments."""
         return cast("DebuggedKilobot", self.machine)
 
     @property

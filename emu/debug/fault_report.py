@@ -261,7 +261,7 @@ def _locate(machine: Machine, inspector: Inspector, case: _Case, trace: Executio
 
 @contextmanager
 def _state_at_fault(machine: Machine, case: _Case, replay_cycle: int | None) -> Iterator[None]:
-    """Run the block with the machine in its state at the fault, as far as that is known."""
+    """Run the block with the machine before the faulty instruction; without a replay, in the state after the fault."""
     if replay_cycle is not None and case.start is not None:
         with sandboxed(machine, case.start):
             machine.run_until(replay_cycle)

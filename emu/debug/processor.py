@@ -30,11 +30,11 @@ class Processor(Protocol):
 
     @property
     def symbol_prefix(self) -> str:
-        """What the compiler writes before the names of C."""
+        """Prefix that the compiler adds to C names."""
 
     @property
     def entry_is_frame_base(self) -> bool:
-        """Whether variables lie relative to `RawFrame.entry`, whatever the frame base of their function says."""
+        """Whether variables lie relative to `RawFrame.entry` and not to the DW_AT_frame_base of their function."""
 
     @property
     def has_native_instruments(self) -> bool:
@@ -84,10 +84,10 @@ class Processor(Protocol):
         """Return why the object at a DWARF location is not in data memory; empty if it is."""
 
     def write(self, address: int, data: bytes) -> None:
-        """Write bytes of data memory as the debugger's user wants them. Raises ValueError."""
+        """Write bytes of data memory for the debugger's user. Raises ValueError for memory that cannot be written."""
 
     def register_groups(self) -> list[Mapping[str, Any]] | None:
-        """Return the peripherals with their registers, None for those of the chip's table."""
+        """Return the peripherals with their registers; None if the chip's table lists them."""
 
 
 @runtime_checkable

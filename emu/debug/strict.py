@@ -1,7 +1,6 @@
 """Strict mode (`--strict`): report as faults the accesses that hardware permits but that are almost always errors.
 
 - Null page: an access through a pointer to an address below the first peripheral register (W and core registers).
-- Uninitialised read: a load from RAM of which no byte was written since power-on, or since the stack shrank below it.
 - Uninitialised read: a load from RAM of which no byte was written since power-on or since the stack shrank below it.
 
 An instruction that copies from memory to memory does not count as a read: it copies the initialisation marks. Reads

@@ -33,7 +33,7 @@ _TEXT_BYTES: Final = 1 << 22
 """Size of the buffer for lines."""
 _SLOT_BYTES: Final = 320
 _LONGEST_TEXT: Final = 300
-"""Size of the place of a text for trace_text.c, and maximum length of a text, in bytes."""
+"""Size of a text's slot for trace_text.c, and maximum length of a text, in bytes."""
 
 
 @cache
@@ -83,7 +83,7 @@ class Tracer:
         machine.program.changed.append(self._forget_texts)
         print(HEADER, file=stream, flush=True)
         self._binary: Final[BinaryIO | None] = getattr(stream, "buffer", None)
-        """The stream under `stream`, which takes large texts faster."""
+        """The binary stream that `stream` wraps: large texts are written faster without encoding."""
 
     def _start(self) -> Callable[[], None]:
         """Start to log. Return the function that ends it."""

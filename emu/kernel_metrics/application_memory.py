@@ -271,7 +271,7 @@ def measure(machine: Machine, cycles: int) -> ApplicationMemory:
 
 
 def _equation(machine: Machine, kernel: KernelStructures, run: _Run, heap: HeapUse) -> dict[str, Any]:
-    """Return the memory equation with the application's numbers at its fullest moment.
+    """Return the memory equation with the application's numbers when its allocations were largest.
 
     RAM = A + B n + C m + D s + sum over pending messages of (E + d). The stacks of an application differ, so B n is a
     sum over its threads.

@@ -82,7 +82,7 @@ class HeapUse:
     """All other allocations at the end: transmit queues of UARTs, blocks of bus transfers."""
     drivers_peak: int
     fullest: dict[str, int] = field(default_factory=dict)
-    """Use by kind at the fullest moment at which a thread ran."""
+    """Use by kind when the allocations read in the run were largest."""
 
     @property
     def fragmentation(self) -> float:

@@ -47,7 +47,7 @@ def _lines(memory: ApplicationMemory) -> Iterator[str]:
 
 
 def equation_line(memory: ApplicationMemory) -> str:
-    """Return the memory equation with the application's numbers, at its fullest moment."""
+    """Return the memory equation with the application's numbers when its allocations were largest."""
     own = memory.equation
     stacks = " + ".join(str(size) for size in own["stacks"].values()) or "0"
     extra = own["gates"] + own["drivers"]

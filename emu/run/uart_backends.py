@@ -19,7 +19,7 @@ from typing import Final
 READ_SIZE: Final = 4096
 
 NO_ROOM: Final = (errno.ENOSPC, errno.EFBIG, errno.EDQUOT)
-"""Errors of a full disk or of a limit of its user."""
+"""Error numbers of a full disk, an exceeded file size limit and an exceeded quota."""
 SPECIFICATIONS: Final = "-, FILE, pty, tcp:PORT or none"
 
 

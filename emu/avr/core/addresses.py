@@ -31,7 +31,7 @@ _GROUPS: Final = (
 """Address of the first register of a group, and the registers from there."""
 ADDRESSES: Final = {name: first + index for first, names in _GROUPS for index, name in enumerate(names.split())}
 C_NAMES: Final = {"SREG": "SREG_AT"}
-"""Names in C that differ: in the meanings of instructions, SREG is the register's value (isa/rows.py)."""
+"""C names of addresses that differ from the register's: in the instruction table, SREG is the value (isa/rows.py)."""
 
 
 def enumeration() -> str:

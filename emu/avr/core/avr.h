@@ -22,7 +22,7 @@ enum { // kinds of fault (machine.py)
 // Kinds of input. Values: port << 16 | driven << 8 | level; a byte; microvolts of channel INPUT_ANALOG + n.
 enum { INPUT_PIN, INPUT_UART, INPUT_ANALOG };
 
-enum { CH_TEMPERATURE = 8, CH_AIN0, CH_AIN1 }; // of analog_uv
+enum { CH_TEMPERATURE = 8, CH_AIN0, CH_AIN1 }; // indices in analog_uv
 enum { BANDGAP_UV = 1100000, LARGE_FRAME = 64 };
 
 static int bit_of(const struct avr *m, u32 address, u32 bit)

@@ -76,8 +76,8 @@ static void interpret(struct avr *m, const struct insn *code)
         DISPATCH(); \
     } while (0)
 
-// As `interpret`, but also search a waiting loop: instructions after which the CPU, data memory and devices are again in
-// the state that they had at the anchor (waiting.c).
+// As `interpret`, but also search for a waiting loop: instructions after which the CPU, data memory and devices are in
+// the same state again as at the anchor (waiting.c).
 static void interpret_and_trace(struct avr *m, const struct insn *code)
 {
     INSTRUCTION_LABELS

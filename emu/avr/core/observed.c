@@ -1,5 +1,5 @@
 // A run instruction by instruction, for the profile and the debugger. It ends at breakpoints and at changes of a watched
-// range, and counts cycles by instruction. The result is that of `avr_run`: skipping is exact, so not to skip is, too.
+// range, and counts cycles by instruction. It skips no iterations of waiting loops; the result equals that of `avr_run`.
 
 enum { WORDS = FLASH_BYTES / 2, WATCH_BYTES = 64, RUN_BREAK = 6 };
 enum { STOP_NONE, STOP_PLACE, STOP_STEP, STOP_WRITE }; // reasons of RUN_BREAK
@@ -8,7 +8,7 @@ struct observation {
     u64 steps;      // steps after which the run ends, 0: no limit. A step is an instruction or an interrupt entry
     u64 last_cycle; // first cycle of the last instruction or interrupt entry
     u64 passed;     // cycle of the last stop at a place; the run does not stop there again
-    u32 reason;     // of the stop; the caller sets it to STOP_NONE before it continues
+    u32 reason;     // reason of the stop; the caller sets it to STOP_NONE before it continues
     u16 watch_from, watch_count; // range of data memory, at most WATCH_BYTES; a count of 0: none
     u16 site;       // word address of the last instruction, or of the interrupt's vector
     u8 counting;    // 1: count cycles
@@ -44,7 +44,7 @@ i64 avr_run_observed(struct avr *m, const struct insn *code, u64 until, struct o
         if (m->interrupts != interrupts)
             pc = m->pc, cycles = INTERRUPT_CYCLES;
         else if (slept)
-            continue; // to sleep and to wake up is no step
+            continue; // sleeping and waking up are not counted as steps
         else if (m->resets != resets)
             pc = m->starts_in_boot ? m->boot_start : 0;
         o->site = (u16)pc, o->last_cycle = from;

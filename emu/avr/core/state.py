@@ -75,7 +75,7 @@ FIELDS: Final[tuple[tuple[str, str, int], ...]] = (
     ("input_kind", _U8, INPUT_ROOM),
     ("input_value", _U32, INPUT_ROOM),
     ("pin_level", _U8, 3),  # levels that the board drives
-    ("pin_driven", _U8, 3),  # pins that it drives; others float or are pulled up
+    ("pin_driven", _U8, 3),  # pins that the board drives; others float or are pulled up
     ("analog_uv", _U32, ANALOG_CHANNELS),
     ("aref_uv", _U32, 1),
     ("avcc_uv", _U32, 1),
@@ -100,7 +100,7 @@ FIELDS: Final[tuple[tuple[str, str, int], ...]] = (
     ("timer_at", _U64, TIMERS),  # cycle for which the count is valid
     ("timer_position", _U32, TIMERS),  # phase within the period
     ("timer_turn", _U16, TIMERS),  # count at which a dual-slope timer turned; 0: it counts up
-    ("timer_compare", _U16, TIMERS * 2),  # active compare values; written values may wait for the period's update
+    ("timer_compare", _U16, TIMERS * 2),  # active compare values; in PWM modes a written value waits in timer_buffer
     ("timer_buffer", _U16, TIMERS * 2),
     ("timer_capture", _U16, 1),
     ("timer_temp", _U8, 1),
@@ -109,7 +109,7 @@ FIELDS: Final[tuple[tuple[str, str, int], ...]] = (
     ("comparator_out", _U8, 1),
     # converter
     ("adc_clock_start", _U64, 1),
-    ("adc_channel", _U8, 1),  # of the running conversion
+    ("adc_channel", _U8, 1),  # ADMUX of the running conversion
     ("adc_value", _U16, 1),
     ("adc_locked", _U8, 1),  # 1: ADCL was read, the result is held until ADCH is read
     ("adc_warm", _U8, 1),  # 1: the first conversion after switching on is over

@@ -29,7 +29,7 @@ static u32 converted(struct avr *m, u32 channel)
     return counts > 1023 ? 1023 : (u32)counts;
 }
 
-// Start a conversion at cycle `start`. `sample` and `result` are the half-periods of the ADC clock until both.
+// Start a conversion at cycle `start`: sample after `sample`, store the result after `result` half-periods of the clock.
 static void convert(struct avr *m, u64 start, u32 sample, u32 result)
 {
     u32 shift = adc_shift(m);

@@ -1,4 +1,4 @@
-// USART0 in asynchronous mode (data sheet, chapter USART0). A frame takes its time; its bits are not on the pin.
+// USART0 in asynchronous mode (data sheet, chapter USART0). A frame takes its real time; the pins do not show its bits.
 
 enum { RXC = 7, TXC = 6, UDRE = 5, DOR = 3, U2X = 1 };         // UCSR0A
 enum { RXCIE = 7, TXCIE = 6, UDRIE = 5, RXEN = 4, TXEN = 3 };  // UCSR0B

@@ -26,7 +26,7 @@ class Insn:
 
 @cache
 def row_of(word: int) -> Row | None:
-    """Return the row of a first word, None if it is no instruction. An erased word is none either."""
+    """Return the row of a first word, None if it is no instruction. A word of erased flash is no instruction."""
     return next((row for row in _GROUPS[word >> 12] if word & row.mask == row.match), None)
 
 

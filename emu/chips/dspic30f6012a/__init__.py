@@ -5,8 +5,7 @@ the 30F6014A, with which the part shares its data sheet (DS70143).
 
 The device id is in dspic30f6014a.md §1.2.
 
-UNVERIFIED: the pins, where the package lacks port A and
-RC3, RC4, RD12-RD15, RF7 and RF8.
+UNVERIFIED: the pins, where the package lacks port A and RC3, RC4, RD12-RD15, RF7 and RF8.
 """
 
 from __future__ import annotations

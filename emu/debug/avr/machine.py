@@ -219,7 +219,7 @@ class DebuggedKilobot:
         return any(hits)
 
     def hook_pc(self, place: int, hook: Hook, _when: object = None) -> Callable[[], None]:
-        """Call `hook` before the instruction at a byte address; a true result stops the run. Return what removes it."""
+        """Call `hook` before the instruction at a byte address; true stops the run. Return a function to remove it."""
         self._hooks.setdefault(place, []).append(hook)
         self._observation.places[place >> 1] = 1
 

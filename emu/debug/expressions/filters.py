@@ -28,7 +28,7 @@ Token = tuple[str, str]
 def filter_of(inspector: Inspector, condition: str, address: int | None = None) -> Filter | None:
     """Return the filter of a condition at a program address, None if it has none.
 
-    Without an address, the condition may name only what every place of the program knows.
+    Without an address, the condition may name globals and registers only.
     """
     try:
         found = tokens(condition)

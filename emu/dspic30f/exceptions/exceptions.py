@@ -109,7 +109,7 @@ def operands_of(state: State, chip: Chip, recheck: int) -> ExceptionOperands:
 
 
 def requested(m: RuleBuilder, p: ExceptionOperands, slip: Number | None = None) -> Number:
-    """Return a bit mask of the enabled requests. `slip` is the next cycle if interrupts may slip through."""
+    """Return a bit mask of the enabled requests. `slip`: with `ipl_slip`, the cycle after the boundary, else None."""
     bits: Number = 0
     for number, (flags, enables) in enumerate(p.words):
         enabled = m.get(enables)

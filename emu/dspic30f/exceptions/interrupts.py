@@ -163,8 +163,7 @@ class Exceptions(RuleInterpreter):
         """Return the cycle of a request that ends Idle or Sleep, None if there is none.
 
         Such a request is a trap, or an enabled interrupt of priority 1 or more; the CPU priority does not matter
-        (isa.md
-        §11).
+        (isa.md §11).
         """
         for trap in self.traps.all:
             if self._state.intcon1 & trap.flag:

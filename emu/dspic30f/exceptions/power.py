@@ -16,7 +16,7 @@ NO_RULE: Final = Rule(None)
 DRAIN_CYCLES: Final = 1_000_000
 """Cycles that devices run after the CPU stops without an enabled wake-up source, so that transmitters can drain.
 
-If an event is due later than that, the run ends after exactly these cycles, wherever its slices end."""
+If an event is due later than that, the run ends after exactly these cycles, in slices of any length."""
 
 
 class Sleeping(Enum):

@@ -119,8 +119,7 @@ class Builder(Protocol):
         """Return a core register by name.
 
         Names are RCOUNT TBLPAG XMODSRT XMODEND YMODSRT YMODEND XBREV, and the PUSH.S shadows W0S W1S W2S W3S SRS
-        (isa.md
-        §2.6).
+        (isa.md §2.6).
         """
 
     def set_reg(self, name: str, v: Value) -> None:

@@ -131,8 +131,7 @@ def parse(statement: str, expr: Expr = Number.read) -> Parsed:
     """Parse one instruction without label and comment.
 
     ``expr`` parses the expressions in operands and may raise its own errors. Its result must have a ``value``, an int
-    or
-    None. Raises StatementError for an unknown mnemonic and for operands that fit no form.
+    or None. Raises StatementError for an unknown mnemonic and for operands that fit no form.
     """
     statement = statement.strip()
     mnemonic, *rest = statement.split(None, 1) or [""]

@@ -142,7 +142,7 @@ class Compiler:
             return None
         try:
             entries, code = unpack_object(blob)
-        except (struct.error, zlib.error):  # by a process that ran while its sources were changed
+        except (struct.error, zlib.error):  # written by a process whose sources were changed while it ran
             return None
         self.statistics.from_disk += 1
         return self.load(code, key, entries)

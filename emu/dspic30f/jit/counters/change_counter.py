@@ -70,7 +70,7 @@ class ChangeCounter(CycleCounter):
     def check_changes(self, site: int, cycle: Number, next_pc: Number) -> str:
         """Emit the comparison of all watched numbers after the instruction at `site`.
 
-        Return the truth, as IR operand, that native code must return to Python.
+        Return an IR operand that is true if native code must return to Python.
         """
         return _emit_log_call(self._e, cycle, next_pc | site << 32, self._hits)
 

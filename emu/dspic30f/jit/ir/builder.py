@@ -126,7 +126,7 @@ class LlvmBuilder:
         self.e.end(f"br i1 {truth(ok)}, label %{label}, label %{self.slow_label}, !prof !0")
         self.e.start(label)
 
-    # -- pure -------------------------------------------------------------------------------------------------------
+    # -- values without side effects --------------------------------------------------------------------------------
     def select(self, c: Number, a: Number, b: Number) -> Number:
         """Emit a selection: `a` if `c` else `b`."""
         return self.e.select(c, a, b)
@@ -436,7 +436,7 @@ class LlvmBuilder:
         self.deferred.stores.append(lambda: self._store_request_cycle(address, rises))
 
     def _store_request_cycle(self, address: int, rises: Number) -> None:
-        """Emit the store of the request cycle, which is the next one, if software sets a flag; one flag at most."""
+        """Emit the store of the request cycle, the next cycle, if software sets a flag; one flag at most."""
         bit = self.ctz16(rises | 0x8000)
         since = pointer(self.e, (bit << 3) + self.layout.offset["irq.since"] + 8 * flag_row(address))
         self.e.store(since, self.select(rises == 0, self.e.load(since, 64), self.now + 1), 64)

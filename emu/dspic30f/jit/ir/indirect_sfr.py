@@ -52,7 +52,7 @@ def indirect_sfr_text(core: Core, layout: MachineLayout) -> str:
 
 
 def _switch(e: Emitter, m: BoundaryEmitter, kinds: list[int], word: Number, rules: list[Rule], plain: str) -> None:
-    """Branch on the kind of the word: to block `plain`, or to block `plain`.number of its rule."""
+    """Branch on the kind of the word: to block `plain`, or for rule number N to block `plain`.N; else to `slow`."""
     cases = " ".join(f"i64 {FIRST_RULE + number}, label %{plain}.{number}" for number in range(len(rules)))
     simple = " ".join(f"i64 {kind}, label %{plain}" for kind in (PLAIN, INTERRUPT_CONTROL, FLAGS))
     e.end(f"switch i64 {wide(m.table(tuple(kinds), word))}, label %slow [ {simple} {cases} ]")
