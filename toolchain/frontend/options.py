@@ -158,7 +158,7 @@ class _ArgumentCursor:
         return self.words[self.at - 1]
 
     def insert(self, words: list[str]) -> None:
-        """Let `words` be the next arguments."""
+        """Insert `words` before the next argument."""
         self.words[self.at : self.at] = words
 
     def value(self, option: str) -> str:

@@ -302,7 +302,7 @@ DIRECTIVES: dict[str, Handler] = {
     **DATA_DIRECTIVES,
 }
 
-REJECTED: dict[str, str] = {  # pic30-as refuses these directives as well (abi-elf.md §4.3)
+REJECTED: dict[str, str] = {  # pic30-as refuses these directives, too (abi-elf.md §4.3)
     ".zero": "use .space",
     ".balign": "use .align",
     ".balignw": "use .align",

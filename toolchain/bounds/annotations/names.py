@@ -52,7 +52,7 @@ class NameResolver:
 
     def file(self, symbol: Symbol) -> str:
         """Return the file that defines a function or variable, "" if unknown."""
-        if symbol.type == STT_OBJECT:  # its address may be that of a function as well: data and code are two spaces
+        if symbol.type == STT_OBJECT:  # its address may equal that of a function: data and code are two spaces
             return self.sources.lines.files.get(symbol.value, "")
         known = self.sources.functions.get(symbol.value)
         if known is not None and symbol.value in self.entries:
