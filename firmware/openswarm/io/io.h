@@ -13,7 +13,7 @@ void motors_stop(void); /* speeds 0, coils off; any context */
 void uart_init(uint8 uart);
 void uart_start(uint8 uart);
 void uart_tick(void);                         /* ISR, every 1 ms */
-sint16 uart_next_byte(uint8 uart);            /* ISR: 0-255, or -1 = nothing left to send */
+sint16 uart_next_byte(uint8 uart);            /* ISR: 0-255, or -1: no byte to send */
 void uart_received(uint8 uart, uint8 byte);   /* ISR */
 void uart_overrun(uint8 uart);                /* ISR: the hardware lost bytes */
 

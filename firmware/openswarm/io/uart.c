@@ -2,7 +2,7 @@
 /* UARTs: dynamically buffered transmission, back-pressure and replaceable Tx- and Rx-processors.
  *
  * A message is encoded into a chain of small blocks of the heap, which is committed as a whole or not at all.
- * Writers lock the slice; the ISR sends from the first block and hands it to the kernel when it is empty. */
+ * Writers lock the slice; the ISR sends from the first block and passes it to the kernel when it is empty. */
 #include "io.h"
 #include "kernel.h"
 

@@ -190,7 +190,7 @@ static sys_error subscribe(uint16 id, uint16 pid, sys_handler handler, sys_condi
         if (s == NULL) {
             return SYS_ERROR_MEMORY;
         }
-        while (*link != NULL && link != delivery_cursor) { /* behind the cursor it would get the current message too */
+        while (*link != NULL && link != delivery_cursor) { /* after the cursor it would get the current message, too */
             link = &(*link)->next;
         }
         if (link == delivery_cursor) {

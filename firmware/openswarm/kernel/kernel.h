@@ -200,7 +200,7 @@ extern sys_pcb **process_scan;
 /* Most kernel calls begin with os_enter() or os_enter_blocking() and, unless refused, end with os_leave(). The slice is
  * locked in between, as in a critical section. */
 HAL_OUTLINE sys_error os_enter(void);          /* refused in ISRs */
-HAL_OUTLINE sys_error os_enter_blocking(void); /* refused outside threads; process_block() unlocks as well */
+HAL_OUTLINE sys_error os_enter_blocking(void); /* refused outside threads; process_block() also unlocks */
 HAL_OUTLINE bool os_leave(sys_error error);    /* returns true, or false and sets the last error */
 void os_call_in_section(void (*run)(void *), void *arg); /* run cannot end the section, whatever it starts or ends */
 

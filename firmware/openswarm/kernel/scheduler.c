@@ -144,7 +144,7 @@ bool Sys_Set_Scheduler(const sys_scheduler *scheduler)
     pick_thread = scheduler->pick;
     os_eager = scheduler->eager;
     os_pending |= OS_CHOICE;
-    if (pick_thread == NULL) { /* there is nothing to choose within a slice */
+    if (pick_thread == NULL) { /* round robin chooses no thread within a slice */
         os_pending &= (uint16)~OS_CHOICE;
         os_eager = false;
         hal_slice_unforce();

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Hardware watchdog (openswarm_reset.h). The kernel stack restarts it after each tick of the clock; a context that
- * holds the kernel stack back lets it expire. */
+/* Hardware watchdog (openswarm_reset.h). The kernel stack restarts it after each tick of the clock; it expires if
+ * a context delays the kernel stack for too long. */
 #include "hal_reset.h"
 #include "kernel.h"
 #include "openswarm_reset.h"

@@ -15,7 +15,7 @@ enum {
     DATA_HEADER = 3,
     PART = 5,
     PARTS = (HAL_UPDATE_ROW + PART - 1) / PART,
-    SHORTEST = 1000, /* ms between advertisements, doubled while nothing is new */
+    SHORTEST = 1000, /* ms between advertisements, doubled after each one without an inconsistency */
     LONGEST = 60000,
     PATIENCE = 3 * SYS_SPREAD_TICK, /* ms without data before a request is repeated, plus up to twice that */
     BEHIND = 2000,                  /* the same after data of a row that this robot has already */
@@ -214,7 +214,7 @@ static void on_request(const uint8 *m)
     }
     if (version == have.version && program == identity(&have) && their_row < have.rows) {
         parts = allowed(their_row, parts);
-        if (wanted_parts == 0 || their_row < wanted_row) { /* lowest row first: it fills gaps of the others as well */
+        if (wanted_parts == 0 || their_row < wanted_row) { /* lowest row first: it fills gaps of the others, too */
             wanted_row = their_row;
             wanted_parts = parts;
             part_sent = (uint8)draw(PARTS); /* two robots with the row begin with different parts */
@@ -222,7 +222,7 @@ static void on_request(const uint8 *m)
             wanted_parts |= parts;
         }
     } else if (version == want.version && program == identity(&want) && their_row == row && (lacking & ~parts) == 0) {
-        postpone_request(PATIENCE); /* the answer serves this robot as well */
+        postpone_request(PATIENCE); /* the answer serves this robot, too */
     }
 }
 

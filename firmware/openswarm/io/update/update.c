@@ -254,8 +254,8 @@ uint16 Sys_Get_NextVersion(void)
     return choose(&facts) == NONE ? 0 : facts.version;
 }
 
-/* Counts a try before the program runs, because an uncounted try could repeat for ever. If a bit sticks, it uses the
- * next one. */
+/* Counts a try before the program runs, because an uncounted try could repeat for ever. If a bit cannot be
+ * cleared, the next one counts. */
 static bool count_try(uint8 store)
 {
     uint16 tries = hal_update_flags(store) & TRIES;

@@ -122,7 +122,7 @@ void hal_idle(const volatile uint16_t *pending)
 {
     __asm__ volatile("cpsid i" ::: "memory");
     if ((*pending & OS_WORK) == 0) {
-        __asm__ volatile("dsb\n\twfi" ::: "memory"); /* ends with a masked interrupt as well */
+        __asm__ volatile("dsb\n\twfi" ::: "memory"); /* a masked interrupt ends the sleep, too */
     }
     __asm__ volatile("cpsie i\n\tisb" ::: "memory");
 }

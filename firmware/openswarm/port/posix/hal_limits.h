@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Sizes on a host. Thread stacks are host stacks of HOST_STACK bytes beside the heap; what the kernel's heap holds for
- * a thread is only nominal. */
+/* Sizes on a host. Thread stacks are host stacks of HOST_STACK bytes outside the heap; the stack that the
+ * kernel's heap holds for a thread is not used. */
 #ifndef HAL_LIMITS_H
 #define HAL_LIMITS_H
 

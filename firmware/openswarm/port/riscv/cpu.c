@@ -82,7 +82,7 @@ bool hal_stack_init(sys_pcb *process, uint8_t *stack, uint16_t bytes, void (*ent
     return true;
 }
 
-/* WFI ends with a masked interrupt as well. */
+/* A masked interrupt also ends WFI. */
 void hal_idle(const volatile uint16_t *pending)
 {
     (void)CSR_CLEAR(mstatus, MSTATUS_MIE);
@@ -101,7 +101,7 @@ HAL_OUTLINE void hal_stop(void)
     }
 }
 
-/* An exception, or an interrupt that nothing enables; on an emptied kernel stack, everything is masked. */
+/* An exception, or an interrupt that is never enabled; on an emptied kernel stack, everything is masked. */
 HAL_USED HAL_NORETURN void cpu_fault(uint32_t cause, uint32_t pc)
 {
     enum { ADDRESS = 1, INTERRUPT = 3, IS_INTERRUPT = 31 };

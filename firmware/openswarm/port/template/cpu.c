@@ -12,7 +12,7 @@
 enum { THREAD, SLICE, DEVICE, STACK_BYTES = 256 * 1024, UNLOCKS_PER_MS = 50, MS_PER_SLICE = 10 };
 
 typedef struct {
-    ucontext_t registers; /* replace: nothing, registers lie on the thread's stack and sp points there */
+    ucontext_t registers; /* replace: remove; registers are on the thread's stack, and sp points to them */
     void *stack;
     void (*entry)(void *);
     void *arg;
