@@ -195,7 +195,7 @@ def sweep(
 ) -> Iterator[tuple[int, Seen]]:
     """Inject at every stride-th kernel boundary of each scene from `first` on; yield (number of scenes done, totals).
 
-    `patch` maps addresses to faulty program words, which let the sweep fail.
+    `patch` maps addresses to faulty program words, with which the sweep must fail.
     """
     stage = Stage(path, ipl_slip, patch)
     stage.watch()
@@ -222,7 +222,7 @@ def sweep(
 
 
 def fail_every_allocation(path: Path) -> Iterator[tuple[int, int]]:
-    """Let the k-th allocation of each scene fail, for every k; yield (number of scenes done, number of failures).
+    """Make the k-th allocation of each scene fail, for every k; yield (number of scenes done, number of failures).
 
     A device requests its interrupt once, so that the failing allocation may also be that of the interrupt.
     """

@@ -1,4 +1,4 @@
-"""The safe state after a fault: time until the wheels stand, the LED pattern, the cause kept over a reset."""
+"""The safe state after a fault: time until the wheels stop, the LED pattern, the cause that survives a reset."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def stands(machine: Machine) -> bool:
 
 
 def until_it_stands(machine: Machine) -> int:
-    """Return the Tcy until the wheels stand: to the instruction, or to the reset by the watchdog."""
+    """Return the Tcy until the wheels stop, by an instruction or by the watchdog's reset."""
     begin, resets = machine.cycle, len(machine.resets)
     for _ in range(4000):
         machine.step()

@@ -130,7 +130,7 @@ TEST(a_signal_preempts_threads_that_never_call_the_kernel, "port/posix/README.md
     Sys_Init_Kernel();
     CHECK(Sys_Start_ProcessWith(&a) != 0 && Sys_Start_ProcessWith(&b) != 0);
     Sys_Start_Kernel();
-    while (spins[0] == 0 || spins[1] == 0) { /* PID 0 spins as well; if the test fails, the alarm of main.c ends it */
+    while (spins[0] == 0 || spins[1] == 0) { /* PID 0 spins, too; if the test fails, the alarm of main.c ends it */
     }
     unsigned long before = spins[1];
     while (spins[1] == before) {

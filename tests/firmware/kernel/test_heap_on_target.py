@@ -20,7 +20,7 @@ TIMER = 6
 LENGTHS = (1, 3, 5, 8)
 """Values of `bursts`: they allow bursts of up to 1, 4, 16 and 128 messages.
 
-Short bursts let many threads start and end, long ones create many messages.
+With short bursts many threads start and end; long bursts create many messages.
 """
 PATIENCE = 20_000_000_000
 

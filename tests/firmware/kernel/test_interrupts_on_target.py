@@ -137,7 +137,7 @@ static void jump(void) { CALL_TARGETS(GOALS); wherever(); edges++; }
 def test_the_level_check_follows_pointers_by_their_annotation(
     image: Build, tmp_path: Path, target: str, refused: str | None
 ) -> None:
-    """A pointer call of a high level passes if no annotated target calls the kernel; a type stands for its functions.
+    """A pointer call of a high level passes if no annotated target calls the kernel; a type means its functions.
 
     SYS_INTERRUPT is in a header outside the application's folder.
     """

@@ -42,7 +42,7 @@ VARIANTS = {
 }
 """Calls of options with the call that they are "the same" as, whose row is theirs too."""
 OTHERS = {"compat", "config", "infrared", "interrupt", "io", "remote", "scheduler"}
-"""Headers beside openswarm.h that belong to no option of the kernel."""
+"""Headers other than openswarm.h that belong to no option of the kernel."""
 
 
 def declared(header: str) -> set[str]:

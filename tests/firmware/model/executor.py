@@ -233,7 +233,7 @@ class Executor:
             place.data = message
 
     def pid(self, operand: int) -> int:
-        """Return the PID that an operand stands for: a slot, main, the caller, no thread, or a service."""
+        """Return the PID that an operand denotes: of a slot, main, the caller, no thread, or a service."""
         if operand < 4:
             return self.slots[operand]
         return (0, self.k.process_id(), 0xFFFF, 77, self.services[0].pid, self.services[1].pid)[operand - 4]

@@ -1,4 +1,4 @@
-"""Runs programs on the emulated dsPIC30F and on CPUs in QEMU, whose timers stand still.
+"""Runs programs on the emulated dsPIC30F and on CPUs in QEMU, whose timers are stopped.
 
 The clock ticks when the kernel idles.
 """

@@ -51,7 +51,7 @@ class Threads(Calls):
         return next((t for t in (*self.ready, *self.blocked) if t.pid == pid), None)
 
     def start(self, c: Configuration, joinable: bool = False) -> int:
-        """Start a thread behind all ready ones and return its PID, or 0."""
+        """Start a thread, which becomes the last ready one, and return its PID, or 0."""
         stack = c.stack or self.sizes.default_stack
         period = self.sizes.period if c.periodic else 0
         if (
@@ -128,7 +128,7 @@ class Threads(Calls):
         yield "block"
 
     def wake(self, thread: Thread, message: Message | None = None) -> None:
-        """End a wait: the thread becomes ready, behind all others. Its last error is OK."""
+        """End a wait: the thread becomes the last ready one. Its last error is OK."""
         self.remove_blocked(thread)
         if thread.awaited is not None:
             thread.result, thread.awaited, thread.condition = message, None, None
@@ -214,7 +214,7 @@ class Threads(Calls):
             self.running.state = State.READY
 
     def rotate(self) -> None:
-        """End the slice of the running thread: it goes behind all ready ones."""
+        """End the slice of the running thread: it becomes the last ready one."""
         self.ready.append(self.ready.pop(0))
         if self.has_work or self.scheduler.pick is not None:
             self.schedule()

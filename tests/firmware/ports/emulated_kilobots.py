@@ -1,4 +1,4 @@
-"""Kilobots of the project's own AVR emulator behind the interface of `firmware.tools.simulated.kilobots`."""
+"""Kilobots of the project's own AVR emulator with the interface of `firmware.tools.simulated.kilobots`."""
 
 from __future__ import annotations
 

@@ -65,7 +65,7 @@ static void something(void)
     }
 }
 
-/* After any history a robot that hears nothing sends little, and after some minutes only its advertisement. */
+/* After any history a robot that receives no message sends few, and after some minutes only its advertisement. */
 static void silence(void)
 {
     forget_kinds();

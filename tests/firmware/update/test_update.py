@@ -192,7 +192,7 @@ def test_power_fails_at_every_write_of_a_robot(image):
 
 
 def update(robot: Robot, version: int, at_each: Callable[[], None]) -> int:
-    """Bring a version into use; return the number of operations."""
+    """Install and run a version; return the number of operations."""
     operations = 0
     robot.stops_at_operations = True
     for command in (RECEIVE, ACTIVATE, None, CONFIRM):

@@ -1,4 +1,4 @@
-/* Random histories of the heap; a timer measures the cycles of calls that allocate. Nothing interrupts: the counts are
+/* Random histories of the heap; a timer measures the cycles of calls that allocate. No interrupt occurs: the counts are
  * those of the calls alone. */
 #include <openswarm.h>
 #include <p30F6014A.h>

@@ -1,5 +1,5 @@
-/* Runs one program of model/, which the test writes into `program`. The timers stand still: the clock ticks when the kernel
- * idles. The folder of each port has the rest of the machine. */
+/* Runs one program of model/, which the test writes into `program`. The timers are stopped: the clock ticks when the
+ * kernel idles. The folder of each port has the rest of the machine. */
 #include "../../model/interpreter.c"
 
 volatile uint16 port_sizes[SIZES]; /* for the test */
