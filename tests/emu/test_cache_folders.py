@@ -64,7 +64,7 @@ def test_all_new_folders_are_private(cache: Path) -> None:
 
 @needs_full_device
 def test_a_full_disk_leaves_no_half_written_object(cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """An object that does not fit is not stored, and nothing of it stays."""
+    """An object that does not fit is not stored, and no part of it remains."""
     objects = fill(cache)
     before = sorted(cache.rglob("*"))
 

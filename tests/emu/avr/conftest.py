@@ -35,7 +35,7 @@ def compiled(source: Path, out: Path, *flags: str) -> AvrImage:
 
 @pytest.fixture
 def build(tmp_path: Path) -> Build:
-    """Return a function that builds C text behind the usual headers."""
+    """Return a function that builds C text preceded by the usual headers."""
 
     def one(text: str, *flags: str) -> AvrImage:
         source = tmp_path / "program.c"

@@ -36,7 +36,7 @@ def test_programs_run_as_in_simavr(pair: Pair, program: int, tmp_path: Path) -> 
 
 
 def test_an_interrupt_takes_four_cycles(machine: Machine) -> None:
-    """The CPU enters an interrupt in 4 cycles; one instruction runs behind SEI (avr.md §1)."""
+    """The CPU enters an interrupt in 4 cycles; one instruction runs after SEI (avr.md §1)."""
     m = machine("""
         ISR(INT0_vect, ISR_NAKED) { asm volatile("in r24, 0x3f\\n reti"); }
         int main(void) {
@@ -95,7 +95,7 @@ def test_power_down_stops_the_timers(machine: Machine) -> None:
 
 
 def test_power_down_suspends_a_timer_interrupt(machine: Machine) -> None:
-    """An interrupt of timer 0 that was due during power-down comes after it, later by the time of the sleep."""
+    """An interrupt of timer 0 that was due during power-down is delayed by the duration of the sleep."""
     m = machine("""
         ISR(WDT_vect) { }
         ISR(TIMER0_COMPA_vect) { PORTB = 1; }
@@ -120,7 +120,7 @@ def test_sleep_without_interrupts_halts(machine: Machine) -> None:
 
 
 def test_the_watchdog_resets(machine: Machine) -> None:
-    """A watchdog that is not restarted resets the chip: MCUSR tells the cause, RAM is kept."""
+    """A watchdog that is not restarted resets the chip: MCUSR has the cause, and RAM is unchanged."""
     m = machine("""
         #include <avr/wdt.h>
         uint8_t starts __attribute__((section(".noinit")));
@@ -137,7 +137,7 @@ def test_the_watchdog_resets(machine: Machine) -> None:
 
 
 def test_faults() -> None:
-    """Illegal words, accesses behind RAM and flash, and stacks outside RAM stop the machine at their instruction."""
+    """Illegal words, accesses beyond RAM and flash, and stacks outside RAM stop the machine at their instruction."""
     sts, lds, push, nop = 0x9200, 0x9000, 0x920F, 0
     ldi_z = (0xE0F0 | 0x800, 0xE0E0)  # ldi r31, 0x80; ldi r30, 0
     for words, pc, text in (

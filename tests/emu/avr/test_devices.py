@@ -255,7 +255,7 @@ def test_a_reset_switches_the_emitters_off(build: Build) -> None:
 
 
 def test_the_signature_is_read_within_four_cycles(machine: Machine) -> None:
-    """LPM reads the signature right behind the write of SPMCSR, later flash."""
+    """LPM reads the signature directly after the write of SPMCSR, and flash later."""
     m = run(machine, """
         first = boot_signature_byte_get(0), third = boot_signature_byte_get(4);
         SPMCSR = 1 << SIGRD | 1;

@@ -66,7 +66,7 @@ def test_pulses_have_the_published_times(program: Program) -> None:
 
 
 def test_two_robots_exchange_messages(program: Program) -> None:
-    """A message is received whole, with the distance that its strength stands for; the decoder of pulses agrees."""
+    """A message is received whole, with the distance of its strength; a decoder of pulses gives the same message."""
     for gap in (35, 50, 65):
         swarm = running(program("gradient"), 2, gap)
         sender = swarm.robots[0]

@@ -87,7 +87,7 @@ def test_json(build: Build, capsys: pytest.CaptureFixture[str]) -> None:
 
 
 def test_a_fault_names_function_and_line(build: Build, capsys: pytest.CaptureFixture[str]) -> None:
-    """A store behind RAM ends the run with status 1 and the place of the instruction."""
+    """A store beyond RAM ends the run with status 1 and the place of the instruction."""
     image = build(FAULT)
     assert main(["run", image.path, "--board", "kilobot"]) == 1
     told = capsys.readouterr().err

@@ -159,9 +159,9 @@ def test_a_poke_ends_a_waiting_loop(build: Build) -> None:
 
 
 def test_a_pin_is_read_late_once(build: Build) -> None:
-    """A loop whose first round reads the level before a change ends in the second one.
+    """A loop whose first iteration reads the level before a change ends in the second one.
 
-    The change of an emitter ends the native call, so the search for rounds begins right behind it.
+    The change of an emitter ends the native call, so the search for a repeating iteration begins directly after it.
     """
     image = build("""
         int main(void) {

@@ -73,7 +73,7 @@ def test_right_motor_goes_forward_with_rising_and_left_with_falling_phases(robot
 @pytest.mark.parametrize("blinks", [False, True])
 def test_step_history_equals_reads_at_each_quantum(blinks):
     """Step counts from the ring of port changes equal reads at each quantum, although the ring also holds changes of
-    the LEDs, whose watchers receive all of them."""
+    the LEDs. The LEDs' watchers receive all of their changes."""
     quick, plain = Robot(), Robot()
     draw = random.Random(7)
     index, cycle, lit, entries, ends = 0, 100, [], [], list(range(1_000, 41_000, 1_000))

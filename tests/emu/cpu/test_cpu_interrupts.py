@@ -219,7 +219,7 @@ def test_what_an_instruction_closes_counts_at_once_or_with_slip_one_boundary_lat
     engine: str, slip: int, taken: bool, closing: str
 ) -> None:
     """isa.md §14.3 [unsure]: if the flag rises in the cycle of a write that raises IPL or clears IEC, the request is
-    blocked at once, or with slip one boundary later."""
+    blocked at once, or with `ipl_slip` one boundary later."""
     rig = Rig(f"nop\n{closing}\nend: nop\nloop: bra loop\n{ISR}", engine, ipl_slip=slip, w0=0x00E0)
     rig.vector(T1_VECTOR, "isr")
     rig.interrupt_at(1)

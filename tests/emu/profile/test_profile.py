@@ -275,8 +275,8 @@ def test_callgrind_files_are_what_the_specification_says(files):
 
 
 def test_speedscope_files_nest_and_add_up(files):
-    """In a speedscope file time only increases, the innermost frame ends first, all frames are closed at the end, and
-    the time of open frames is the time of the level."""
+    """In a speedscope file time never decreases, the innermost frame ends first, and all frames are closed at the end.
+    The time of open frames is the time of the level."""
     data = json.loads(files[1].read_text())
     cycles = Counter()
     for profile in data["profiles"]:

@@ -1,8 +1,8 @@
 """Long runs: loops of millions of instructions in native code, which are counted exactly and compared.
 
-A machine with the engine's default block code runs beside one with exact code alone. Exact code updates the record
-after every instruction and counts instructions. At random points the plain interpreter, which also counts, runs
-beside both from the same snapshot.
+A machine with the engine's default block code is compared with one that has exact code alone. Exact code updates the
+record after every instruction and counts instructions. At random points the plain interpreter, which also counts, runs
+from the same snapshot and is compared with both.
 """
 
 from __future__ import annotations

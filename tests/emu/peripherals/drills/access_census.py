@@ -9,7 +9,7 @@ from emu.dspic30f.state.state import DA, NOT_REPEATING, RA
 from emu.machine.machine import Machine
 
 ACCESS_MODES: Final = ("address", "pointer", "REPEAT", "DO", "handler", "event")
-"""Names of access modes. Bit n of a key's last part stands for mode n: by address, by pointer, under REPEAT, in DO,
+"""Names of access modes. Bit n of a key's last part is mode n: by address, by pointer, under REPEAT, in DO,
 in an interrupt handler, in the cycle in which an event is due."""
 
 

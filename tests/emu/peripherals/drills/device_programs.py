@@ -451,7 +451,7 @@ def difference(
     chip: Chip = DSPIC30F6014A,
     tally: Counter[tuple[str, str]] | None = None,
 ) -> str | None:
-    """Run engines beside the plain one, with external bytes, edges and levels. In one of three seeds an engine runs
+    """Compare engines with the plain one, with external bytes, edges and levels. In one of three seeds an engine runs
     in random pieces. Return the first difference, or None."""
     text, writer = program(seed, chip)
     stretches = flash(text, chip)

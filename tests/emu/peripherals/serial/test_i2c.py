@@ -13,7 +13,7 @@ BASE = I2CEN | SCLREL
 
 
 class Memory(I2cDevice):
-    """I2C device with 256 registers behind an address pointer, like the camera."""
+    """I2C device with 256 registers that an address pointer selects, like the camera's."""
 
     def __init__(self):
         self.registers = bytearray(range(256))
