@@ -71,7 +71,7 @@ def test_transport_needs_a_goal() -> None:
 
 @pytest.mark.slow
 def test_a_swarm_transports_the_box(tmp_path: Path) -> None:
-    """Twenty scripted robots bring the box to the goal that it hides, and the trial ends with the arrival."""
+    """Twenty scripted robots push the box to the goal that it hides, and the trial ends with the arrival."""
     trial = trial_of("chen2015", "15", tmp_path / "out")
     assert trial.series.last("distance") == 0
     assert trial.times[-1] < 890

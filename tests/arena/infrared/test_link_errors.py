@@ -13,7 +13,7 @@ DOCS = Path(__file__).parents[3] / "docs"
 
 def test_measured_errors_are_within_the_phases_of_the_model(monkeypatch: pytest.MonkeyPatch) -> None:
     """At every distance with repaired bits, the measured rate lies between the expected ones of the best and the worst
-    tenth of the phases; without the settling after a transition it is more than twice too low at 25 to 28 cm."""
+    tenth of the phases. At 25 to 28 cm it is more than twice the rate expected without settling after a transition."""
     monkeypatch.syspath_prepend(str(DOCS / "tools/infrared"))
     sys.modules.pop("link", None)
     import link  # type: ignore[import-not-found]

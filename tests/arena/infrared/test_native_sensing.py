@@ -234,7 +234,7 @@ def test_a_conversion_read_in_the_next_quantum_sampled_the_surfaces_of_its_own(
     )  # fmt: skip
     polling, begins = "2:      btss    ADCON1, #0\n        bra     2b\n", "1:      mov "
     assert polling in SELDOM
-    # So the second conversion samples before the end of quantum 24 and ends, by its event, after it.
+    # The second conversion therefore samples before the end of quantum 24 and ends, by its event, after it.
     late = SELDOM.replace(begins, f"        repeat  #12700\n        nop\n{begins}")
     image = assembled(late.replace(polling, "        repeat  #1500\n        nop\n"))
     step = FirmwareController.control_step

@@ -149,7 +149,7 @@ def test_light_and_commands_reach_the_firmware(run: Run, image: Callable[[str], 
 
 
 def test_a_fault_stops_one_robot_only(run: Run, image: Callable[[str], AvrImage], capsys: Any) -> None:
-    """A robot with an illegal instruction is reported and stands; the others continue. Status 1."""
+    """A robot with an illegal instruction is reported and stops; the others continue. The run exits with status 1."""
     image('duties(65, 65); __asm__ volatile (".word 0x9419");')
     found = run(kilobots("[[50, 50, 0]]") + kilobots("[[100, 100], [105, 100]]", "gradient"), 3, status=1)
     assert "robot 0 stopped: illegal instruction 0x9419 at " in "".join(capsys.readouterr())
