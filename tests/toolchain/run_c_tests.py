@@ -106,7 +106,7 @@ EXPECTATIONS = {
     "pr64242": "checks that __builtin_setjmp takes nothing from the stack",
     "strstr-asm": "expects an asm label to rename the builtin function too",
 }
-"""Tests that expect something beyond C and clang's documented extensions."""
+"""Tests whose expectations exceed C and clang's documented extensions."""
 
 MEMORY = re.compile(r"does not fit|no room for the stack|overflow|largest symbols|must be less than 8192|bytes too")
 

@@ -129,7 +129,7 @@ def test_leb128_is_dwarfs(asm):
 
 
 def test_bss_only_counts(asm):
-    """A bss section has no content, but its size in the file is doubled as well (abi-elf.md §6.2)."""
+    """A bss section has no content, but its size in the file is doubled, too (abi-elf.md §6.2)."""
     out = asm(".section .nbss,bss,near\nx: .space 10\n .bss\n .space 3\n")
     assert (out.sections[".nbss"].units, out.sections[".bss"].units, len(out.sections[".nbss"].data)) == (10, 3, 0)
     with pytest.raises(ToolError, match="only zero"):

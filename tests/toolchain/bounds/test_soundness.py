@@ -93,7 +93,7 @@ PROGRAMS = {
 }  # fmt: skip
 """Adversarial code by name: code after `mov _in,w0`, number of inputs, and reason and line of the refusal.
 
-None stands for a program that is bounded.
+None: the program is bounded.
 """
 LOOSE = {"half a word of the stack": 11}
 """Maximum ratio of bound and longest run if it exceeds 1.1: the analysis does not know a byte of the program."""

@@ -34,7 +34,7 @@ def words_of(row: OptionRow) -> list[str]:
 
 @pytest.mark.parametrize("row", TABLE, ids=lambda row: row.spelling)
 def test_every_row_acts_as_it_says(row: OptionRow, tmp_path: Path) -> None:
-    """Ignored options change nothing, refused ones are errors with their sentence, the others change something."""
+    """Ignored options have no effect, refused ones are errors with their sentence, and the others have an effect."""
     words = words_of(row)
     assert row_of(words[0]) == row
     if row.effect == REFUSED:

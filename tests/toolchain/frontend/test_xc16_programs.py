@@ -218,7 +218,7 @@ def test_what_means_nothing_here_is_refused_with_a_sentence(tmp_path: Path, caps
 def test_variables_beyond_near_memory(level: str, options: tuple[str, ...], tmp_path: Path) -> None:
     """Variables beyond near memory are accessed correctly.
 
-    A fixed address determines the access; with -mlarge-data all other variables are far as well.
+    A fixed address determines the access; with -mlarge-data all other variables are far, too.
     """
     source = """
     int big __attribute__((address(0x2100))) = 3;
