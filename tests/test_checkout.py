@@ -1,4 +1,4 @@
-"""Unusual checkouts and surroundings: read-only, behind a symbolic link, `umask 077`, no HOME, SIGINT ignored."""
+"""Unusual checkouts and environments: read-only, reached by a symbolic link, `umask 077`, no HOME, SIGINT ignored."""
 
 from __future__ import annotations
 

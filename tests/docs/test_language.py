@@ -60,7 +60,7 @@ def test_words_are_spelt_right() -> None:
 
 
 def test_pages_are_in_british_spelling(tmp_path: Path) -> None:
-    """codespell's list of British and American spellings, read from American to British, finds nothing on the pages."""
+    """codespell's list from American to British spelling finds no word on the pages."""
     american = tmp_path / "american.txt"
     source = Path(codespell_lib.__file__).parent / "data" / "dictionary_en-GB_to_en-US.txt"
     pairs = [line.partition("->") for line in source.read_text("utf-8").splitlines()]

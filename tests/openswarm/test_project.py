@@ -1,4 +1,4 @@
-"""A new project: its baselines, CMake beside make, the folders of its sources, and its workflow step by step."""
+"""A new project: its baselines, CMake and make, the folders of its sources, and its workflow step by step."""
 
 from __future__ import annotations
 
