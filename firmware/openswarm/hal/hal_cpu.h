@@ -108,7 +108,7 @@ void hal_start(void);
 /* Builds the first frame of a thread that calls entry(arg), then os_thread_returned(). The stack ends where process
  * begins. Sets process->sp and limit. Slice locked. False: out of memory. */
 bool hal_stack_init(sys_pcb *process, uint8_t *stack, uint16_t bytes, void (*entry)(void *), void *arg);
-/* Releases what hal_stack_init took besides the block. The thread has ended and does not run. */
+/* Releases resources that hal_stack_init took besides the block. The thread has ended and does not run. */
 #ifdef HAL_STACK_IS_TAKEN
 void hal_stack_release(sys_pcb *process);
 #else

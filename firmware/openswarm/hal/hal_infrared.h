@@ -10,7 +10,7 @@
 
 enum { HAL_INFRARED_SENSORS = 8 };
 
-/* No interrupt comes before hal_start(). */
+/* No interrupt occurs before hal_start(). */
 void hal_infrared_start(void);
 void hal_infrared_light(bool on); /* all emitters at once */
 /* The robot's permanent number, 1 to 2047, or 0: none. */

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Selector: a position counts once it was read equal for DEBOUNCE_MS (openswarm-original.md §5.7: 25 ms). */
+/* Selector: a position is accepted after DEBOUNCE_MS of equal readings (openswarm-original.md §5.7: 25 ms). */
 #include "hal_cpu.h"
 #include "io.h"
 

@@ -75,7 +75,7 @@ sys_pcb *os_overflow(void)
     static const char text[] = "stack overflow: thread ";
     char number[DIGITS + 1];
     char *end = number + sizeof number;
-    if (os_cleanup_host != NULL) { /* a cleanup overflowed it; process_end_running() continues the teardown */
+    if (os_cleanup_host != NULL) { /* a cleanup overflowed the stack; process_end_running() continues the teardown */
         HAL_STORE(os_running, os_cleanup_host);
         os_cleanup_host = NULL;
         os_in_kernel = false;

@@ -219,7 +219,7 @@ void heap_coalesce(void)
 
 /* ---- Allocation ------------------------------------------------------------------------------------------------- */
 
-/* Allocates from the reserve, but never leaves a rest that is too small for a hole. */
+/* Allocates from the reserve, but never leaves a remainder too small for a hole. */
 BOUNDS_AT("swap_reserve()", loop 1); /* after one swap the reserve is the largest free block */
 void *heap_alloc(uint16 size)
 {

@@ -59,7 +59,7 @@ class Robot:
     loop: int
     """Cycles or instructions of the measuring loop: a `nop` and the jump back to the call."""
     response: int
-    """Cycles from a request to that instruction that the chip takes and the simulator omits."""
+    """Cycles of the chip from a request to its vector, which the simulator omits."""
     defines: str = ""
     """Sizes for `latency` and `footprint`, whose constants take RAM on an AVR."""
 

@@ -17,7 +17,7 @@ static bool wait_for(uint32_t flag)
 }
 
 /* 24 MHz crystal, / 24 * 336 / 2 = 168 MHz; APB1 42 MHz, its timers 84. QEMU runs at 168 MHz by itself and models
- * neither crystal nor PLL: their flags never come, so the wait is bounded. */
+ * neither crystal nor PLL: their flags are never set, so the wait is bounded. */
 HAL_USED void board_clock(void)
 {
     RCC_CR |= RCC_CR_HSEON;

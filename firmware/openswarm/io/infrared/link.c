@@ -18,7 +18,7 @@ enum {
         8, /* dark scans: earlier light is the middle of a frame whose preamble was missed */
     LEAST_ONES = 10, /* minimum scans of light of a preamble: a proximity flash has 3 or 4 */
     LEAST_BEHIND_FLASH = 5,
-    FLASH_COUNTS = 24, /* scans after a flash of this robot that may have hidden the first ones */
+    FLASH_COUNTS = 24, /* scans after an own flash, which may have hidden the first ones of a preamble */
     LONGEST_ONES = 20, /* maximum scans of a preamble, somewhat less than 7 bits; more are ones inside a frame */
     MOST_ONES = 36,    /* more scans of light are no frame */
     CLEAR = 12,        /* dark scans before sending: more than usual words have in a row */

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Lower layer of the analog inputs: one scan after the other, a pair of emitters dark, then lit. */
+/* Lower layer of the analog inputs: repeated scans, two for each pair of emitters: first dark, then lit. */
 #ifndef HAL_ANALOG_H
 #define HAL_ANALOG_H
 
