@@ -185,7 +185,7 @@ def _absolute(text: str) -> str:
 
 
 def _search_folders(job: ClangJob) -> list[str]:
-    """Return the folders of the options of a job in which clang searches headers."""
+    """Return the folders that the job's options name for header searches."""
     words = job.arguments
     folders = [after for word, after in pairwise(words) if word in SEARCH_FLAGS]
     return folders + [word[2:] for word in words if word.startswith("-I") and len(word) > 2]

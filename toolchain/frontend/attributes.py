@@ -49,7 +49,7 @@ def _section(name: str, *others: str) -> Rewrite:
 
 
 def _refused(what: str) -> list[str]:
-    """An attribute that clang reports as an error with the words `what is not supported`."""
+    """Return an attribute at which clang reports the error "<what> is not supported"."""
     return [f'__aligned__(sizeof(struct {{ int i; _Static_assert(0, "{what} is not supported"); }}))']
 
 
