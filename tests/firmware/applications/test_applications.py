@@ -19,7 +19,7 @@ from tests.firmware.kernel.test_kernel_on_target import FCY, load
 
 
 def heard(path: Path) -> tuple[emu.Machine, bytearray]:
-    """Return a robot with an image, and the text that it will have sent on UART1."""
+    """Return a robot with an image, and a buffer that collects what the robot sends on UART1."""
     machine, said = load(path), bytearray()
     machine.uart[1].on_byte = lambda byte, _: said.append(byte)
     return machine, said

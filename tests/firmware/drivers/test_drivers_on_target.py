@@ -211,7 +211,7 @@ def i2c_wire(machine: Machine):
 
 
 def test_a_slave_that_holds_sda_is_clocked_free(image: Build) -> None:
-    """If a slave holds SDA in the middle of a byte, the driver clocks it free and the camera works."""
+    """If a slave holds SDA in the middle of a byte, the driver frees the bus by clock pulses and the camera works."""
     machine = robot(image("clustering"), selector=START)
     i2c_wire(machine).hold(sda=True, clocks=7)
     machine.board.camera.show(noise())

@@ -88,7 +88,7 @@ TEST(threads_whose_cleanups_kill_each_other_end_once, "openswarm_cleanup.h: ends
     pids[2] = start(push_kill, &pids[0]);
     Sys_Sleep(40);
     CHECK(Sys_Kill_Process(pids[1]));
-    CHECK(strcmp(trace, "kkf") == 0); /* the third finds the first gone */
+    CHECK(strcmp(trace, "kkf") == 0); /* the last cleanup finds pids[1] ended */
     Sys_Sleep(2);
     CHECK_EQ(deliveries, 3);
     CHECK(lists_are_well_formed());

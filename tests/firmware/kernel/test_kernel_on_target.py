@@ -200,7 +200,7 @@ def test_the_emulator_reports_a_stack_overflow_as_a_fault(image: Build, words: t
 
 
 def test_a_run_ends_with_status_1_after_a_stack_overflow(image: Build, capsys: pytest.CaptureFixture[str]) -> None:
-    """`emu run`, also with --json: the first kind of overflow, a push."""
+    """`emu run`, also with --json, exits with status 1 after the first kind of overflow, a push."""
     path = str(image("overflow", TARGET_APPS))
     assert main(["run", path, "--seconds", "0.1"]) == 1
     assert "stack overflow" in capsys.readouterr().err

@@ -29,8 +29,8 @@ def scene(image: Build, number: int) -> Machine:
 def test_a_preempted_thread_gets_the_rest_of_its_slice(image: Build) -> None:
     """A preempted thread gets the rest of its slice (hal_cpu.h, hal_slice_restart()).
 
-    Beside a higher-priority thread that waits for every tick, equal threads still change every 10 ms of their own
-    time.
+    Equal threads change every 10 ms of their own CPU time, although a higher-priority thread interrupts them at every
+    tick.
     """
     machine = scene(image, SLICES)
     resumed = turn = 0

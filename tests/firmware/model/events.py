@@ -19,7 +19,7 @@ class Events(Threads):
         self.queue: list[Message] = []
         """Messages for the next delivery."""
         self.batch: list[Message] = []
-        """Messages of the current delivery that are still to come."""
+        """Messages of the current delivery that no handler has received yet."""
         self.cursor = 0
         """Position of the handler that runs, among the subscriptions of `delivering`."""
         self.delivering: Event | None = None

@@ -83,8 +83,8 @@ class Executor:
     """One run of a program."""
 
     def __init__(self, program: Program, sizes: Sizes, later: tuple[int, int, int] = (-1, 0, 0)) -> None:
-        """Prepare a run. later: when the interrupt of LATER comes, as the number of records before it, the time, and
-        the number of boundaries passed at that time since the last record."""
+        """Prepare a run. later: when the interrupt of LATER occurs. It gives the number of records before it, the
+        time, and the number of boundaries passed at that time since the last record."""
         self.program = program
         self.later, self.later_used, self.later_came = later, False, False
         self.records: list[Record] = []

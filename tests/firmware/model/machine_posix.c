@@ -30,7 +30,7 @@ static log *shared;
 static bool is_final;
 static uint8 skipped_allocations, failing_allocations;
 
-/* Instead of the port's (linker option --wrap): a number of allocations in a row fails. */
+/* Replaces the port's function (linker option --wrap): a number of consecutive allocations fail. */
 bool __wrap_host_allocation_fails(void);
 bool __wrap_host_allocation_fails(void)
 {

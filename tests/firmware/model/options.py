@@ -157,7 +157,7 @@ class Options(Events):
         return False
 
     def leave_joins(self, thread: Thread) -> None:
-        """Remove the thread's own join and wake the threads that join it; it then does not become a zombie."""
+        """Remove the thread's own join and wake threads that join it: a joined thread does not become a zombie."""
         for waiting, pid in list(self.joins):
             if waiting is thread:
                 self.joins.remove((waiting, pid))

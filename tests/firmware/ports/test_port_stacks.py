@@ -166,8 +166,8 @@ def test_an_overflow_of_the_kernel_stack_stops_the_system(target: str, tmp_path:
     """An overflow of the kernel stack stops the system: at once with an MPU, on AVR and RISC-V after the handlers.
 
     AVR and RISC-V detect it by the fill pattern in the last byte of the stack, so the memory below must survive. On the
-    AVR the kernel's variables are below: the handler leaves the last bytes of the stack to the tick that interrupts it
-    (port/avr/README.md).
+    AVR the kernel's variables are below, so the handler leaves the last bytes of the stack for the tick, which
+    interrupts it (port/avr/README.md).
     """
     (tmp_path / "handler").mkdir()
     (tmp_path / "handler" / "main.c").write_text(IN_A_HANDLER)

@@ -135,7 +135,7 @@ static long replay(void)
     return 2 * 5;
 }
 
-/* One frame after another as a neighbour sends them, the one at `spoilt` with a changed bit. Returns their number. */
+/* Delivers a neighbour's frames in order and changes a bit of frame `spoilt`. Returns the number of frames. */
 static long transfer(long spoilt, int bit, int seconds)
 {
     long frames = 0;

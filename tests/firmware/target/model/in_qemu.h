@@ -56,7 +56,7 @@ void machine_init(void)
     inject_init();
 }
 
-/* A tick counts 1 ms of the slice, which shall not end before machine_slice(). */
+/* Restarts the slice at each tick, so that only machine_slice() ends it. */
 static void restore_slice(void)
 {
     if (!hal_slice_is_over()) {
