@@ -34,7 +34,7 @@ RARE = ("refuse_message", "save_dsp")
 LEADS = (2, 4, 6)
 """Cycles from a request to the deepest moment; an interrupt is accepted some cycles after its request."""
 ACCEPTANCE, FRAME, HANDLER = 8, 80, 2_000
-"""Maximum number of instructions from a request to its handler, of the slice interrupt, and of any other handler."""
+"""Maximum number of instructions: from a request to its handler, in the slice interrupt, in any other handler."""
 PRIORITY = 5
 """Position of the CPU priority in SR."""
 

@@ -81,7 +81,7 @@ def test_the_notebook_page_runs(
 def test_the_page_of_an_own_experiment_runs(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """All blocks of docs/own-experiment.md run in order in an empty folder; the files have the names that it says."""
+    """All blocks of docs/own-experiment.md run in order in an empty folder; the page's file names are used."""
     pytest.importorskip("pandas", reason="pandas is not installed (extra: test)")
     import matplotlib as mpl
 

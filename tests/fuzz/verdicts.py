@@ -31,7 +31,7 @@ INTERRUPTED = 130
 JUDGED = ("toolchain", "emu")
 """Packages whose sources verdicts depend on, relative to the project."""
 APART = tuple(ROOT / "toolchain" / name for name in ("bounds", "proof"))
-"""Subpackages that only analyse the compiler's output; a change of them keeps verdicts valid."""
+"""Subpackages that only analyse the compiler's output; verdicts stay valid when they change."""
 SUFFIXES = {".py", ".c", ".cpp", ".h", ".s", ".inc", ".csv"}
 POLL_S = 1.0
 """Seconds between two checks for an interrupt, or for the death of the campaign's process."""

@@ -81,7 +81,7 @@ def test_motors_move_a_robot_as_published(run: Run, image: Callable[[str], AvrIm
 
 
 def test_robots_differ_and_calibration_compensates(tmp_path: Path) -> None:
-    """Weak motors get higher duties in the EEPROM; the calibrated speed differs by the rest only."""
+    """Weak motors get higher duties in the EEPROM; calibrated speeds are within 10 % of the nominal."""
     scene = load_scene("orbit")
     scene = with_overrides(scene, ["kilobots.motor_sd=0.1"])
     world = World(scene, 3)
@@ -228,7 +228,7 @@ def test_wrong_values_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture[
 
 
 def test_a_debugger_refuses_a_kilobot(capsys: pytest.CaptureFixture[str]) -> None:
-    """The debugger knows the e-puck's CPU only; the message names the kind of the robot."""
+    """The debugger supports only the e-puck's CPU; the message names the kind of the robot."""
     needs("avr-gcc")
     assert main(["debug", "orbit", "--robot", "0"]) == 2
     assert "--robot 0: it has no firmware of an e-puck: it is a kilobot" in capsys.readouterr().err

@@ -53,7 +53,7 @@ def test_colours_of_one_figure_are_distinct(name: str, sight: str) -> None:
 
 @pytest.mark.parametrize("sight", SIGHT)
 def test_neighbouring_groups_are_distinct(sight: str) -> None:
-    """Each colour of a group differs from the next one, and all from the paper."""
+    """Each colour of a group differs from the next one, and all from the background."""
     assert min(difference(one, other, sight) for one, other in pairwise(palette.GROUPS)) >= LEAST
     assert min(difference(one, palette.PAPER, sight) for one in palette.GROUPS) >= LEAST
 

@@ -27,7 +27,7 @@ ONE = ("--robots", "1", "--objects", "0", "--set", "marks.columns=1", "--set", "
 
 
 def test_a_robot_leaves_the_rectangle(tmp_path: Path) -> None:
-    """A robot that drives straight ahead for 12 s is at least 60 cm outside the rectangle. The record knows that there
+    """A robot that drives straight ahead for 12 s is at least 60 cm outside the rectangle. The record states that there
     are no walls, its bundle verifies, and a further trial begins where it ended."""
     (tmp_path / "straight.py").write_text(STRAIGHT)
     words = ["--controller", str(tmp_path / "straight.py"), "--minutes", "0.2", "--trials", "1", "--jobs", "1"]
@@ -55,7 +55,7 @@ def test_infrared_sensors_face_no_wall() -> None:
 
 
 def test_walls_beside_a_polygon_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """A room with a polygon has its outline as wall, so the key contradicts it. The list of keys has the key."""
+    """A room with a polygon has its outline as walls; `arena.walls = false` is refused. `arena keys` lists it."""
     scene = tmp_path / "room.toml"
     scene.write_text('name = "room"\n[arena]\nwalls = false\npolygon = [[0, 0], [200, 0], [100, 200]]\n')
     assert main(["run", str(scene), "--brain", "scripted"]) == 2

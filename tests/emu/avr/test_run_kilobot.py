@@ -76,7 +76,7 @@ def test_only_resets_are_reported_as_resets(build: Build, capsys: pytest.Capture
 
 
 def test_json(build: Build, capsys: pytest.CaptureFixture[str]) -> None:
-    """--json gives the same as data, with the limit's reason and status."""
+    """--json prints the same results as data, with reason and status of the limit that ended the run."""
     image = build(BLINK)
     assert main(["run", image.path, "--board", "kilobot", "--json", "--cycles", "100000", "--exit-code"]) == 124
     told = validated("emu", "run-kilobot", capsys.readouterr().out)

@@ -225,7 +225,7 @@ def test_low_battery_is_seen_by_the_program(program):
 
 
 def test_framing_errors_and_overruns_reach_the_program(program):
-    """Chip reference §10.2: FERR comes with its character; clearing OERR empties the full FIFO."""
+    """Chip reference §10.2: FERR is set with its character; clearing OERR empties the full FIFO."""
     machine = start(program("serial.c"))
     robot = machine.board
     heard = bytearray()

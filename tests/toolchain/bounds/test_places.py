@@ -197,7 +197,7 @@ int main(void) { unsigned n = 0; for (struct node *p = head; p && %s; p = p->nex
 
 
 def test_a_counter_that_decides_no_branch_does_not_prolong_the_analysis(tmp_path: Path, capsys) -> None:
-    """A loop that only data end has no known bound although a counter changes; a counter that ends it bounds it."""
+    """A loop that only its data end has no known bound even if it counts; a counter in its condition bounds it."""
     row = report(capsys, built(tmp_path, COUNTED_LIST % "1", "-Os"))
     assert list(row["open"].values()) == ["this loop has no known bound"]
     row = report(capsys, built(tmp_path, COUNTED_LIST % "n != 1000", "-Os"))

@@ -93,7 +93,7 @@ def test_interrupts_requested_in_the_deepest_moments_reach_nested_stacks(
 ) -> None:
     """Requested interrupts nest deeper than in the plain run and stay within every bound.
 
-    An analysis that forgets interrupts on top of others states less than what is measured.
+    An analysis that omits nested interrupts states a bound below the measured depth.
     """
     path = image("hello")
     rows = rows_of("hello", path, SHORT)

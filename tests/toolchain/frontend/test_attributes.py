@@ -98,7 +98,7 @@ int main(void) { with_statements(); return next(3) == 4 && y == 4 ? 0 : 1; }
 
 
 def test_naked_functions_of_assembly_keep_parameter_and_result(tmp_path: Path) -> None:
-    """A naked function with C statements in the same file does not change one whose operands only assembly uses."""
+    """A naked function of assembly only is unchanged by a naked function with C statements in the same file."""
     (tmp_path / "a.c").write_text(MIXED)
     built = build([tmp_path / "a.c"], tmp_path / "a.elf", "-Os", "-Wall")
     assert (built.status, built.messages) == (0, "")
