@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import math
 import os
 import sys
 import time
@@ -27,6 +28,8 @@ from arena.trial.trial import run_trial
 from arena.world.physics import World
 
 TRIAL_S = 900
+SWARMS = 100, 1000, 10_000
+"""Sizes of the scripted swarms."""
 
 
 class Clock:
@@ -95,6 +98,18 @@ def measure(
     return cpu / seconds, physics.seconds * share, rendering.seconds * share
 
 
+def measure_swarm(count: int, seconds: float) -> float:
+    """Return CPU seconds per simulated second of a scripted swarm without objects, on marks every 25 cm."""
+    marks = math.ceil(math.sqrt(count))
+    side = 25.0 * (marks + 1)
+    scene = scripted(load_scene("clustering").with_values(
+        robots__count=count, objects__count=0, arena__width_cm=side, arena__height_cm=side, marks__columns=marks,
+        marks__rows=marks, marks__spacing_cm=25.0,
+    ))  # fmt: skip
+    controllers = [ScriptedController(scene, 1, robot, "aggregate") for robot in range(count)]
+    return measure(scene, list(controllers), seconds, 0.5, True)[0]
+
+
 def with_two_threads(scene: Scene, image: Path, seconds: float, warm_up: float) -> dict[str, float]:
     """Return wall seconds per simulated second of a trial with two threads, and its memory in MB."""
     plan = Plan(scene, "openswarm", "A", image, 1, warm_up + seconds, 1)
@@ -152,14 +167,17 @@ def main() -> int:
             scene, lambda: [FirmwareController(scene, 1, i, image, 8) for i in robots], options.seconds, 3.0
         ),
     }
+    swarms = {count: measure_swarm(count, options.seconds) for count in SWARMS}
     if options.json:
-        print(json.dumps(results | {"openswarm, two threads": together}))
+        print(json.dumps(results | {"openswarm, two threads": together, "swarms": swarms}))
         return 0
     for name, one in results.items():
         print(f"{name:10} {one['cpu_s'] * 1000:7.1f} ms CPU per simulated second ({one['real_time']:.1f} x real time): "
               f"physics {one['physics']:.0%}, rendering {one['rendering']:.0%}; "
               f"{one['by_python_cpu_s'] * 1000:.1f} ms if Python sees each look; "
               f"{len(robots)} robots, 15 min: {one['trial_cpu_s']:.0f} s of one core")  # fmt: skip
+    for count, cpu in swarms.items():
+        print(f"{count} scripted robots: {cpu:.3f} s CPU per simulated second")
     print(f"one trial by two threads: {together['wall_s'] * 1000:.1f} ms per simulated second, 15 min: "
           f"{together['trial_wall_s']:.0f} s; {together['memory_mb']:.0f} MB in all")  # fmt: skip
     return 0

@@ -146,9 +146,9 @@ static void add_polygon(struct view *v, const struct polygon *one, const f64 *at
     }
 }
 
-// Set the viewpoint to the own pose in `poses`, extrapolated by `quanta` of the motion since `before`, and collect what
-// is in view. Both tables hold x, y, heading of the robots, then x, y of the objects, then headings of the polygons.
-void set_viewpoint(struct view *v, const f64 *poses, const f64 *before, f64 quanta)
+// Set the viewpoint to the own pose in `poses`, extrapolated by `quanta` of the motion since `before`. Both tables hold
+// x, y, heading of the robots, then x, y of the objects, then headings of the polygons.
+static void place_camera(struct view *v, const f64 *poses, const f64 *before, f64 quanta)
 {
     const f64 *now = poses + 3 * v->own, *then = before + 3 * v->own;
     f64 x = now[0] + quanta * (now[0] - then[0]), y = now[1] + quanta * (now[1] - then[1]);
@@ -157,7 +157,23 @@ void set_viewpoint(struct view *v, const f64 *poses, const f64 *before, f64 quan
     v->x = x + v->camera_ahead * v->cos, v->y = y + v->camera_ahead * v->sin;
     if (v->yaw != 0)
         v->cos = cos(heading + v->yaw), v->sin = sin(heading + v->yaw);
-    v->disc_count = v->side_count = 0;
+}
+
+static void collect_sides(struct view *v, const f64 *poses)
+{
+    const f64 *objects = poses + 3 * v->robots;
+    v->side_count = 0;
+    for (i64 i = 0; i < v->outline_count; i++)
+        add_side(v, &v->outlines[i]);
+    for (i64 i = 0; i < v->polygon_count; i++)
+        add_polygon(v, &v->polygons[i], objects + 2 * v->polygons[i].object, objects[2 * v->objects + i]);
+}
+
+// Set the viewpoint (`place_camera`), and collect what is in view.
+void set_viewpoint(struct view *v, const f64 *poses, const f64 *before, f64 quanta)
+{
+    place_camera(v, poses, before, quanta);
+    v->disc_count = 0;
     const f64 *objects = poses + 3 * v->robots;
     for (i64 i = 0; i < v->objects; i++)
         if (v->object_discs[i].radius > 0)
@@ -174,10 +190,7 @@ void set_viewpoint(struct view *v, const f64 *poses, const f64 *before, f64 quan
         add_disc(v, poses[3 * i], poses[3 * i + 1], robot);
     }
     sort(v->discs, v->disc_count);
-    for (i64 i = 0; i < v->outline_count; i++)
-        add_side(v, &v->outlines[i]);
-    for (i64 i = 0; i < v->polygon_count; i++)
-        add_polygon(v, &v->polygons[i], objects + 2 * v->polygons[i].object, objects[2 * v->objects + i]);
+    collect_sides(v, poses);
 }
 
 static int contains(const struct patch *patch, f64 x, f64 y)
@@ -325,73 +338,6 @@ void classify_rays(const struct view *v, const struct rays *rays)
         }
         rays->seen[i] = (uint8_t)(p.seen == FLOOR ? floor_class(v, slope, p.rise) : p.seen);
     }
-}
-
-static f64 wall_depth(const struct view *v, f64 slope)
-{
-    f64 east = v->cos - slope * v->sin, north = v->sin + slope * v->cos, inf = __builtin_inf();
-    if (v->width == inf)
-        return inf;
-    f64 to_x = east > 0 ? (v->width - v->x) / east : east < 0 ? -v->x / east : inf;
-    f64 to_y = north > 0 ? (v->height - v->y) / north : north < 0 ? -v->y / north : inf;
-    return max(min(to_x, to_y), v->nearest);
-}
-
-// The nearest hit so far. A body that the ray passes above is no hit, unless the ray has reached the floor before.
-struct hit {
-    f64 depth, height;
-    i64 class;
-};
-
-static void offer_hit(const struct view *v, struct hit *best, f64 rise, f64 depth, f64 height, i64 class)
-{
-    f64 z = v->camera_height + rise * depth;
-    if (z >= 0 && z > height)
-        return;
-    if (depth < best->depth || (depth == best->depth && (height < best->height ||
-                                                         (height == best->height && class < best->class))))
-        *best = (struct hit){depth, height, class};
-}
-
-// Pixel class of one ray, exactly as `ReferenceCamera.column` computes it.
-static i64 ray_class(const struct view *v, const struct rays *rays, f64 slope, f64 rise)
-{
-    f64 a = 1 + slope * slope, reach = v->range / sqrt(a), inf = __builtin_inf();
-    struct hit best = {inf, inf, 0};
-    for (i64 d = 0; d < v->disc_count; d++) {
-        if (!can_hit(&v->discs[d], rays->right_most, rays->left_most))
-            continue;
-        f64 depth = disc_depth(v, &v->discs[d], slope, a);
-        if (depth > 0 && depth <= reach)
-            offer_hit(v, &best, rise, depth, v->discs[d].height, v->discs[d].class);
-    }
-    for (i64 s = 0; s < v->side_count; s++) {
-        f64 depth = side_depth(v, &v->sides[s], slope);
-        if (depth > 0 && depth <= v->sides[s].range / sqrt(a))
-            offer_hit(v, &best, rise, depth, v->sides[s].height, v->sides[s].class);
-    }
-    for (i64 d = 0; d < v->fixed_count; d++) {
-        struct disc disc = in_camera_frame(v, &v->fixed[d]);
-        f64 depth = disc_depth(v, &disc, slope, a);
-        if (depth > 0)
-            offer_hit(v, &best, rise, depth, disc.height, disc.class);
-    }
-    f64 z = v->camera_height + rise * (best.depth < inf ? best.depth : wall_depth(v, slope));
-    if (z < 0)
-        return floor_class(v, slope, rise);
-    return best.depth < inf ? best.class : z <= v->wall_height ? WALL : ABOVE;
-}
-
-// Votes of the sensor window: 256 times the pixels that show an object, plus the pixels that show a robot.
-// `sensor_classes` maps each pixel class to the class that the sensor takes it for.
-i64 window_votes(const struct view *v, const struct rays *rays, const uint8_t *sensor_classes)
-{
-    i64 found = 0;
-    for (i64 i = 0; i < rays->count; i++) {
-        i64 seen = sensor_classes[ray_class(v, rays, rays->left[i], rays->up[i])];
-        found += seen == OBJECT ? 256 : seen == ROBOT;
-    }
-    return found;
 }
 
 // Render a line of the picture from a pose and return its pixels. `noise` has one value per colour of each pixel.

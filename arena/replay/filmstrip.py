@@ -11,7 +11,7 @@ from matplotlib.patches import Circle, Polygon
 from numpy.typing import NDArray
 
 from arena.camera.appearance import COLOURS, NAMES, OBJECT, ROBOT, WALL
-from arena.camera.renderer import WINDOW_COLUMNS
+from arena.camera.line_of_sight import WINDOW_COLUMNS
 from arena.replay.page import sample_data
 from arena.robots.controller import STRIP_COLUMNS, STRIP_PIXELS
 from arena.scene import geometry, palette

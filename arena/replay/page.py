@@ -16,6 +16,7 @@ from typing import Any, Final
 import numpy as np
 
 from arena.camera.appearance import colours_of
+from arena.camera.line_of_sight import LineOfSight
 from arena.camera.renderer import Renderer
 from arena.robots.controller import STRIP_COLUMNS, STRIP_PIXELS
 from arena.scene import dimensions, geometry, palette
@@ -162,15 +163,16 @@ def _camera_views(trial: Trial) -> list[tuple[list[int], list[bytes]]]:
             views.append((seen, strips))
             continue
         is_script = not any(strips)
-        renderer = Renderer(scene, robot, traits_of(scene, seed, robot))
+        traits = traits_of(scene, seed, robot)
+        renderer, sight = Renderer(scene, robot, traits), LineOfSight(scene, robot, traits)
         for sample, (places, things) in enumerate(zip(robots, objects, strict=True)):
             if seen[sample] >= 0 and not is_script:
                 continue
             poses = Poses([(x, y, float(headings[i][sample])) for i, (x, y) in enumerate(places)], things)
-            renderer.set_viewpoint(poses)
             if seen[sample] < 0:
-                seen[sample] = renderer.line_of_sight()
+                seen[sample] = sight.look(poses)
             if is_script:
+                renderer.set_viewpoint(poses)
                 strips[sample] = colours[renderer.classify_row(_MIDDLE_ROW, _STRIP)].tobytes()
         views.append((seen, strips))
     return views

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Final, NamedTuple, Protocol
 
 from arena.camera.appearance import NOTHING, OBJECT
-from arena.camera.renderer import Renderer
+from arena.camera.line_of_sight import LineOfSight
 from arena.robots.reactive import steps_per_second
 from arena.scene import dimensions
 from arena.scene.loader import FCY, Scene
@@ -177,7 +177,7 @@ class ScriptedController(ControllerWithoutUart):
         self._quantum = scene.clock.quantum_tcy
         self._next_frame = power_on_cycle(scene, seed, robot) + FIRST_FRAME_TCY
         self._starts_at = remote_key_cycle(scene) + OK_DECODED_TCY if scene.start_of(robot).remote else 0
-        self._renderer = Renderer(scene, robot, traits_of(scene, seed, robot))
+        self._sight = LineOfSight(scene, robot, traits_of(scene, seed, robot))
         self._rng = generator(seed, STREAM_SENSORS, robot)
         self._false_negative = scene.camera.false_negative
         self._false_positive = scene.camera.false_positive
@@ -195,8 +195,8 @@ class ScriptedController(ControllerWithoutUart):
         start = tick * self._quantum
         end = start + self._quantum
         if self._next_frame < end:
-            self._renderer.set_viewpoint(poses, self._before, max(self._next_frame - start, 0) / self._quantum)
-            self._reading.seen = seen = self._sense()
+            quanta = max(self._next_frame - start, 0) / self._quantum
+            self._reading.seen = seen = self._with_errors(self._sight.look(poses, self._before, quanta))
             if self._next_frame + LATENCY_TCY >= self._starts_at:
                 left, right = steps_per_second(self._table, seen)
                 self._next_wheels = left * dimensions.CM_PER_STEP, right * dimensions.CM_PER_STEP
@@ -210,9 +210,8 @@ class ScriptedController(ControllerWithoutUart):
         self._wheels, self._change_at = new, NEVER
         return old[0] + share * (new[0] - old[0]), old[1] + share * (new[1] - old[1])
 
-    def _sense(self) -> int:
-        """Return the answer of the line-of-sight sensor, with the false answers of the scene."""
-        seen = self._renderer.line_of_sight()
+    def _with_errors(self, seen: int) -> int:
+        """Return an answer of the line-of-sight sensor, or a false one as often as the scene has them."""
         if seen != NOTHING and self._false_negative and self._rng.random() < self._false_negative:
             return NOTHING
         if seen == NOTHING and self._false_positive and self._rng.random() < self._false_positive:

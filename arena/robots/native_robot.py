@@ -8,7 +8,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from ctypes import POINTER, Structure, addressof, c_int64, c_void_p, pointer
 
-from arena.camera.renderer import Renderer, RowRays
+from arena.camera.renderer import Renderer
+from arena.camera.view import RowRays
 from arena.infrared.ring import InfraredRing
 from arena.world.wheels import Wheels
 from emu.boards.epuck.board import Epuck

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import Final
 
-from arena.camera.renderer import Renderer
+from arena.camera.line_of_sight import LineOfSight
 from arena.infrared.propagation import Optics
 from arena.infrared.ring import ambient
 from arena.scene.loader import Scene
@@ -45,12 +45,11 @@ class SenseReader:
         self._scene: Final = scene
         self._robot: Final = robot
         self._optics: Final = Optics(scene)
-        self._renderer: Final = Renderer(scene, robot, traits_of(scene, seed, robot))
+        self._sight: Final = LineOfSight(scene, robot, traits_of(scene, seed, robot))
 
     def read(self, poses: Poses, seconds: float, wheels: tuple[float, float]) -> Senses:
         """Return the senses at `poses`; `wheels` are the present wheel speeds in cm/s."""
-        self._renderer.set_viewpoint(poses)
         near = tuple(share * reflection_at(distance) / FULL_REFLECTION if math.isfinite(distance) else 0.0
                      for distance, share in self._optics.surfaces(poses, self._robot))  # fmt: skip
         light = tuple(counts / FULL_LIGHT for counts in ambient(self._scene, poses.robots[self._robot]))
-        return Senses(seconds, self._renderer.line_of_sight(), near, light, wheels)
+        return Senses(seconds, self._sight.look(poses), near, light, wheels)

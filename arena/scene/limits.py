@@ -26,6 +26,8 @@ from arena.scene.schema import (
     Start,
 )
 
+FIRMWARE_ROBOTS: Final = 1000
+"""Most robots with firmware in a trial: each e-puck takes some MB of the host's memory."""
 _CENTRE: Final = (-10_000, 10_000)
 _PLACED: Final = {
     "count": (0, 10_000),
@@ -39,7 +41,7 @@ LIMITS: Final[Mapping[type[Any], Mapping[str, tuple[float, float]]]] = {
     Arena: {"width_cm": (20, 10_000), "height_cm": (20, 10_000)},
     Marks: {"columns": (1, 10_000), "rows": (1, 10_000), "spacing_cm": (1, 10_000)},
     Robots: {
-        "count": (0, 1000),
+        "count": (0, 10_000),
         "axle_cm": (1, 7.4),
         "thrust_n": (0.01, math.inf),
         "brake_n": (0.01, 1000),
@@ -99,7 +101,7 @@ LIMITS: Final[Mapping[type[Any], Mapping[str, tuple[float, float]]]] = {
     },
     Bluetooth: {"period_ms": (0.1, 10_000)},
     Clock: {"quantum_ms": (0.1, 20), "scripted_quantum_ms": (0.1, 20), "sample_s": (0.02, 60)},
-    RobotGroup: {**_PLACED, "count": (0, 1000), "id_first": (0, 65_535), "selector": (-1, 15)},
+    RobotGroup: {**_PLACED, "count": (0, 10_000), "id_first": (0, 65_535), "selector": (-1, 15)},
     ObjectKind: {
         **_PLACED,
         "radius_cm": (0.5, 100),

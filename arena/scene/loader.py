@@ -383,8 +383,8 @@ def _checked(scene: Scene, errors: TableErrors) -> Scene:
             CHECKS.get(name, check_shape)(errors, table, one, number)
     for name in TABLES:
         check_limits(errors, name, getattr(scene, name))
-    if not 0 <= scene.robots.count <= 1000 or not 0 <= scene.objects.count <= 10_000:
-        words = f"{scene.robots.count} robots and {scene.objects.count} objects; expected at most 1000 and 10000"
+    if not 0 <= scene.robots.count <= 10_000 or not 0 <= scene.objects.count <= 10_000:
+        words = f"{scene.robots.count} robots and {scene.objects.count} objects; expected at most 10000 of each"
         raise errors.at("robots", "count", words)
     check_colour(errors, "robots", scene.robots, None)
     robots = range(scene.robots.count)

@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from functools import cache
+from itertools import product
 from typing import Final
 
 import numpy as np
@@ -18,7 +19,7 @@ from arena.scene.schema import ObjectKind, Placed, RobotGroup
 Place = tuple[float, ...]
 """Position x, y in cm; of a movable polygon also its heading in rad."""
 ROUNDING_CM: Final = 1e-9
-"""Rounding of distances: bodies may touch, as on a lattice with gaps of their diameter."""
+"""Tolerance for rounding errors of distances: bodies may touch, as on a lattice with gaps of their diameter."""
 OVERLAP_CM: Final = 0.5
 """Accepted overlap of bodies with poses in [start]. Bodies that robots push together overlap by about 0.1 cm."""
 TRIES: Final = 2000
@@ -37,7 +38,7 @@ def marks_of(scene: Scene) -> list[Place]:
 
 @cache
 def hexagonal(count: int, spacing: float) -> list[Place]:
-    """Return the `count` points of a hexagonal lattice that are nearest to its origin, nearest first; then by angle."""
+    """Return the `count` points of a hexagonal lattice nearest to its origin, sorted by distance, then by angle."""
     reach = math.ceil(math.sqrt(count)) + 1
     points: list[Place] = [(spacing * (column + row % 2 / 2), spacing * row * math.sqrt(3) / 2)
               for row in range(-reach, reach + 1) for column in range(-reach, reach + 1)]  # fmt: skip
@@ -59,14 +60,16 @@ def place_all(scene: Scene, rng: np.random.Generator) -> tuple[list[tuple[float,
     if len(radii) > len(marks):
         raise SceneError(f"{scene.name}: no room: {len(radii)} robots and objects on {len(marks)} marks")
     chosen = [marks[index] for index in rng.permutation(len(marks))[: len(radii)]]
-    for index, ((x, y), radius) in enumerate(zip(chosen, radii, strict=True)):
+    placed = _PlacedDiscs(max(radii, default=0.0))
+    for (x, y), radius in zip(chosen, radii, strict=True):
         nearest = min(x, y, scene.arena.width_cm - x, scene.arena.height_cm - y)
         if nearest < radius and scene.arena.walls:
             where = f"the mark at ({x:g}, {y:g}) cm is nearer to a wall than {radius:g} cm"
             raise SceneError(f"{scene.name}: no room: {where}")
-        for (other_x, other_y), other in zip(chosen[:index], radii[:index], strict=True):
+        for other_x, other_y, other in placed.near(x, y):
             if math.hypot(x - other_x, y - other_y) < radius + other:
                 raise SceneError(f"{scene.name}: no room: marks are {scene.marks.spacing_cm:g} cm apart")
+        placed.add(x, y, radius)
     headings = rng.uniform(-math.pi, math.pi, scene.robots.count).tolist()
     robots = [(x, y, angle) for (x, y), angle in zip(chosen, headings, strict=False)]
     return robots, chosen[scene.robots.count :]
@@ -158,15 +161,34 @@ def obstruction(
     return ""
 
 
+class _PlacedDiscs:
+    """Discs of at most a given radius by the cells of a grid: a disc can only touch discs of the cells around it."""
+
+    def __init__(self, radius: float) -> None:
+        self._side = 2 * radius or 1.0
+        self._cells: dict[tuple[int, int], list[tuple[float, float, float]]] = {}
+
+    def add(self, x: float, y: float, radius: float) -> None:
+        """Add a disc."""
+        self._cells.setdefault((math.floor(x / self._side), math.floor(y / self._side)), []).append((x, y, radius))
+
+    def near(self, x: float, y: float) -> Iterator[tuple[float, float, float]]:
+        """Yield x, y and radius of all discs that a disc at a position can touch, and possibly of some others."""
+        column, row = math.floor(x / self._side), math.floor(y / self._side)
+        for cell in product((column - 1, column, column + 1), (row - 1, row, row + 1)):
+            yield from self._cells.get(cell, ())
+
+
 class _Placer:
     """Places bodies one after the other: first those with listed poses, then the others, group by group."""
 
     def __init__(self, scene: Scene, rng: np.random.Generator) -> None:
         self._scene = scene
         self._rng = rng
-        self._taken: list[tuple[float, float, float]] = []
         self._marks: Iterator[Place] = iter([])
         self._outlines = outlines_of(scene)
+        radii = [KINDS[one.kind].radius_cm for one in scene.groups or (RobotGroup(),)]
+        self._placed = _PlacedDiscs(max(radii + [one.radius_cm for one in scene.kinds or (scene.kind_of(0),)]))
 
     def place(self) -> tuple[list[tuple[float, float, float]], list[Place]]:
         """Return the poses of all robots and the positions of all objects."""
@@ -203,13 +225,13 @@ class _Placer:
             if why:
                 raise SceneError(f"{self._scene.name}: no room: {what} {one.name or index} at "
                                  f"({pose[0]:g}, {pose[1]:g}) cm {why}")  # fmt: skip
-            self._taken.append((pose[0], pose[1], radius))
+            self._placed.add(pose[0], pose[1], radius)
             return pose
         why = ""
         for x, y in self._candidates(one, index):
             why = self._obstruction(x, y, radius)
             if not why:
-                self._taken.append((x, y, radius))
+                self._placed.add(x, y, radius)
                 return x, y
         tried = "marks left" if one.place == "marks" else f"place found in {TRIES} tries"
         raise SceneError(f"{self._scene.name}: no room: no {tried} for {what} {one.name or index}"
@@ -241,4 +263,4 @@ class _Placer:
 
     def _obstruction(self, x: float, y: float, radius: float) -> str:
         """Return what obstructs a disc at a position, or an empty text."""
-        return obstruction(self._scene, self._outlines, self._taken, x, y, radius)
+        return obstruction(self._scene, self._outlines, self._placed.near(x, y), x, y, radius)

@@ -24,7 +24,8 @@ from arena.camera.appearance import (
     led_classes,
 )
 from arena.camera.lens import lens_of
-from arena.camera.renderer import NEAREST, VOTES, WINDOW_COLUMNS, WINDOW_ROWS
+from arena.camera.line_of_sight import VOTES, WINDOW_COLUMNS, WINDOW_ROWS
+from arena.camera.view import NEAREST
 from arena.scene import dimensions, geometry
 from arena.scene.loader import Scene
 from arena.scene.robot_kind import Traits

@@ -17,6 +17,7 @@ from arena.experiments import experiment_file
 from arena.robots.epuck import SELECTOR
 from arena.robots.images import image_for
 from arena.robots.reactive import SPEED_TABLES
+from arena.scene.limits import FIRMWARE_ROBOTS
 from arena.scene.loader import Scene, SceneError, load_scene, scripted
 from arena.scene.robot_kind import EPUCK, KILOBOT
 from arena.scene.schema import RobotGroup
@@ -110,7 +111,7 @@ def parse_value(text: str) -> bool | int | float | str | list[Any]:
     if text in ("true", "false"):
         return text == "true"
     if text.startswith("["):
-        with suppress(tomllib.TOMLDecodeError):
+        with suppress(ValueError, RecursionError):
             return list(tomllib.loads(f"value = {text}")["value"])
     for kind in (int, float):
         try:
@@ -123,6 +124,14 @@ def parse_value(text: str) -> bool | int | float | str | list[Any]:
 def folder_name(text: str) -> str:
     """Return `text` as part of a folder's name, without characters that are special to a file system."""
     return re.sub("[^A-Za-z0-9.,=+_-]+", "-", text.lower()).strip("-.")
+
+
+def check_firmware(plan: Plan) -> None:
+    """Raise SceneError if more robots run firmware than one process can hold."""
+    count = sum(plan.image_of(plan.scene.group_of(robot)) is not None for robot in range(plan.scene.robots.count))
+    if count > FIRMWARE_ROBOTS:
+        raise SceneError(f"{plan.scene.name}: robots.count: {count} robots run firmware; expected at most "
+                         f"{FIRMWARE_ROBOTS}, or --brain scripted")  # fmt: skip
 
 
 def plan_from(options: argparse.Namespace, trials: int) -> Plan:
@@ -159,6 +168,7 @@ def plan_from(options: argparse.Namespace, trials: int) -> Plan:
     if controller not in SELECTOR and image is not None:
         raise ValueError(f"--controller {options.controller} runs in Python: use it without --brain {options.brain}")
     plan = Plan(scene, brain, controller, image, trials, 60 * options.minutes, options.seed, own, images, controllers)
+    check_firmware(plan)
     unused = "clock.scripted_quantum_ms" if plan.has_firmware else "clock.quantum_ms"
     if any(setting.partition("=")[0].strip() == unused for setting in options.set):
         raise ValueError(f"--set {unused} has no effect: {'some' if plan.has_firmware else 'no'} robot runs firmware")

@@ -9,7 +9,7 @@ import pytest
 
 import emu
 from arena.camera.appearance import COLOURS
-from arena.camera.renderer import WINDOW_ROWS
+from arena.camera.line_of_sight import WINDOW_ROWS
 from arena.cli import main
 from arena.commands.reaction import OK_AT_TCY, SPEED_WORDS, AlternatingPicture, reaction
 from arena.robots.controller import FIRST_FRAME_TCY, LATENCY_TCY, OK_DECODED_TCY, ScriptedController, power_on_cycle

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from arena.camera.appearance import OBJECT, WALL
+from arena.camera.line_of_sight import LineOfSight
 from arena.camera.renderer import Renderer
 from arena.cli import main
 from arena.infrared.propagation import Optics
@@ -124,7 +125,7 @@ def test_the_camera_sees_boxes_as_the_reference_does(tmp_path: Path, range_cm: f
         poses = Poses(robots, [(150.0, 110.0, float(rng.uniform(-3, 3)))])
         camera, renderer = ReferenceCamera(scene, poses, 0), Renderer(scene, 0)
         renderer.set_viewpoint(poses)
-        assert renderer.line_of_sight() == sensor_of(camera)
+        assert LineOfSight(scene, 0).look(poses) == sensor_of(camera)
         for row in (150, 216, 238, 245, 262):
             slow = [camera.column(int(u), (row,))[0] for u in columns]
             assert renderer.classify_row(row, columns).tolist() == slow

@@ -217,7 +217,7 @@ def test_bodies_start_on_marks_without_overlap() -> None:
         ({"objects__count": 161}, "no room: 166 robots and objects on 165 marks"),
         ({"objects__radius_cm": 30.0}, "no room"),
         ({"marks__spacing_cm": 5.0}, "no room: marks are 5 cm apart"),
-        ({"robots__count": -1}, "robots.count is -1; expected 0 to 1000"),
+        ({"robots__count": -1}, "robots.count is -1; expected 0 to 10000"),
         ({"robots__wheels": 3}, "no scene value robots.wheels"),
         ({"objects__mass_kg": "heavy"}, "objects.mass_kg is 'heavy'; expected float"),
     ],
