@@ -88,7 +88,8 @@ const rewind = () => {                   // to the quantum that ended at the sho
   el("follow").checked = true;
 };
 function begin() {
-  el("studio").hidden = false; el("live").hidden = false; play.hidden = true;  // Run is the only clock of a studio el("running").textContent = "";
+  el("studio").hidden = false; el("live").hidden = false; el("running").textContent = "";
+  play.hidden = true;                    // a studio does not play samples: Run advances the trial
   el("run").onclick = run; el("step").onclick = step; el("rewind").onclick = rewind;
   el("send").onchange = e => { if (chosen >= 0) act({do: "send", robot: chosen, text: e.target.value + "\r"}); else el("error").textContent = "select a robot first"; };
   el("breakpoint").onchange = e => { if (chosen >= 0) act({do: "toggle_breakpoint", robot: chosen, place: e.target.value}); else el("error").textContent = "select a robot first"; };

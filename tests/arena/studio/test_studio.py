@@ -375,7 +375,7 @@ const found = {}, rest = ms => new Promise(done => setTimeout(done, ms));
 const until = async seen => { while (!seen()) { await ask("inspect?robot=0"); await rest(10); } };
 const still = async () => { await rest(100); await until(() => d.studio.now.state === "paused"); };
 (async () => {
-  found.first = d.studio.now.tick;
+  found.first = d.studio.now.tick; found.label = el("running").textContent;
   el("step").click(); await until(() => d.studio.now.tick); await still(); found.stepped = d.studio.now.tick;
   el("speed").value = "4"; el("run").click(); await until(() => d.studio.now.tick > 11);
   el("run").click(); await still();
@@ -404,6 +404,7 @@ def test_the_page_controls_the_trial(tmp_path: Path, monkeypatch: pytest.MonkeyP
     with serving(replace(scripted_plan(), seconds=600.0)) as one:  # long enough to be paused
         found = run_probe(one, PROBE, tmp_path, monkeypatch)
     assert (found["first"], found["stepped"]) == (0, 1)
+    assert found["label"] == "", "the label of a live page says `running` beside a paused trial"
     assert found["ran"] > 10
     assert found["backTick"] == found["ran"]
     assert found["dragged"] == pytest.approx([200, 150], abs=1.5)
