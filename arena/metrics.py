@@ -82,7 +82,7 @@ def largest_share(places: Places, reach_cm: float) -> float:
 SMALL: Final = 48
 """Largest number of objects for which dense matrices are faster than sparse graphs."""
 _CHUNK: Final = 1 << 20
-"""Elements of dense matrices that are in memory at a time, for any length of the trial."""
+"""Maximum number of elements of dense matrices in memory at a time, for any length of the trial."""
 
 
 def largest_shares(places: NDArray[np.float64], reach_cm: float) -> NDArray[np.float64]:

@@ -28,7 +28,7 @@ from arena.trial.record import Trial
 Runs = Mapping[str, list[Trial]]
 SNAPSHOTS_S: Final = (0.0, 600.0)
 _LEGEND_GREY: Final = "0.4"
-"""Colour of the legend's entries that hold for all runs: mean, band, deviation."""
+"""Colour of the legend's entries for mean, band and deviation, which are the same for all runs."""
 NAMES: Final = ("snapshots", "curves", "trajectories", "cpu-load")
 
 

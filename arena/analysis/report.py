@@ -45,7 +45,7 @@ def report(runs: Runs, figures: Mapping[str, list[str]], host_s: Mapping[str, fl
 
 
 def with_results(document: str, text: str) -> str:
-    """Return a document with the text between its two marks replaced. Raises ValueError without these marks."""
+    """Return a document with the text between BEGIN and END replaced. Raises ValueError without these marks."""
     before, begin, rest = document.partition(BEGIN)
     _, end, after = rest.partition(END)
     if not begin or not end:

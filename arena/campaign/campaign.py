@@ -53,7 +53,7 @@ class Plan:
     experiment: Path | None = None
     """File of a user's experiment; None for a built-in or installed one."""
     images: tuple[tuple[str, Path | None], ...] = ()
-    """Firmware of the groups that name their own in the scene, by this name; None for a scripted group."""
+    """Firmware by the name that groups have for it in the scene; None for a scripted group."""
     controllers: tuple[tuple[str, Path], ...] = ()
     """Python files of controllers, by the name that the scene or the run has for them."""
 

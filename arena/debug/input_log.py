@@ -40,7 +40,7 @@ class InputLog:
         """Return the pixels of a camera line, from `source` in the present and from the log in the past."""
         if self._events.quiet:
             pixels = self._lines.get(cycle)
-            return pixels if pixels is not None else np.zeros((len(columns), 3), np.uint8)  # path not in the log
+            return pixels if pixels is not None else np.zeros((len(columns), 3), np.uint8)  # not in the log
         pixels = source(y, columns, cycle)
         if self.is_recording:
             self._lines[cycle] = pixels
@@ -53,7 +53,7 @@ class InputLog:
         lights = self._ir.reflection, self._ir.ambient
         if self._events.quiet:
             found = self._levels.find(cycle, channel)
-            if found is None:  # path not in the log
+            if found is None:  # the replay has left the recorded path
                 return 0
             level, light = found
             half = len(light) // 2

@@ -40,9 +40,9 @@ class DebugSession:
         self._process.start()
         there.drop()
         self._sent = 0
-        """Messages of the client so far."""
+        """Number of messages that the client has sent."""
         self.finished: FinishedTrial | None = None
-        """The trial, after its first end; a rewind may follow."""
+        """The finished trial, once it has ended; a rewind may follow."""
         self.is_over = False
         """Whether the trial has ended and cannot be rewound any more."""
         self.is_detached = False

@@ -50,7 +50,7 @@ class _PipeInbox(SimpleQueue[Message | None]):
     def __init__(self, pipe: PipeEnd) -> None:
         self.pipe = pipe
         self.count = 0
-        """Messages that `get` has returned."""
+        """Number of messages that `get` has returned."""
         self._pending: deque[Message | None] = deque()
 
     def empty(self) -> bool:

@@ -29,7 +29,7 @@ _OVERRUN: Final = 64
 """Tcy by which a robot can pass the end of a quantum, which ends with a whole instruction."""
 
 Levels = tuple[float, ...]
-"""Of each pulse line: the response of a receiver to it, from 0 (dark) to 1 (settled at full light)."""
+"""Response of a receiver to each pulse line, from 0 (dark) to 1 (settled at full light)."""
 
 
 class Receivers(Structure):
@@ -151,7 +151,7 @@ class OpticalChannel:
         return self.quantum + _OVERRUN
 
     def switch(self, robot: int, cycle: int, line: int, lit: bool) -> None:
-        """Switch a pulse line of a robot, or from number `LINES` on one of its LEDs."""
+        """Record that a pulse line of a robot is switched. Numbers from `LINES` on are the robot's LEDs."""
         needed_from = min(cycle, self.horizon) - 4 * self.quantum - 2 * int(self.receivers.settled)
         if line < LINES:
             self._emitters[robot].add(self.receivers, cycle, line, lit, needed_from)

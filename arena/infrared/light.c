@@ -2,7 +2,7 @@
 // the emitters, propagation.py their strength at the sensors, ring.py loss, ripple and noise. This file also
 // updates all sensors of a robot at the start of a quantum.
 //
-// One thread appends to a history while others read older changes of it. So a change is complete before it counts.
+// One thread appends to a history while others read older changes of it. So `count` includes complete changes only.
 
 #include <stdint.h>
 

@@ -36,9 +36,9 @@ LAW_COUNTS, LAW_FROM_CM, LAW_POWER = 10_269.0, 6.0, -2.354
 """Counts A at d cm, fitted to that table: A(d) = 10269 (d - 6)^-2.354, error 6.3 % (swarmcom.md §3.1). UNVERIFIED
 beyond 22 cm."""
 MAX_COUNTS: Final = 3500.0
-"""Greatest effect of one robot: the table saturates there (swarmcom.md §3.1)."""
+"""Greatest amplitude of one robot, at which the table saturates (swarmcom.md §3.1)."""
 MIN_COUNTS: Final = 0.1
-"""Weaker senders, farther than 140 cm, are omitted: all robots of a swarm together would not reach one count."""
+"""Least amplitude of a sender, reached at 140 cm. Weaker senders are omitted: a swarm of them is below one count."""
 _LINES: Final = len(PULSE_PINS)
 _BEARINGS: Final = tuple(math.radians(bearing) for bearing in dimensions.IR_BEARINGS_DEG)
 
@@ -64,7 +64,7 @@ class Signal(NamedTuple):
 
 
 def amplitude(distance_cm: float) -> float:
-    """Return the counts between dark and lit of all emitters of a robot, at a robot that faces it."""
+    """Return the counts by which a robot with all emitters lit differs from a dark one, at a robot that faces it."""
     beyond = distance_cm - LAW_FROM_CM
     return min(LAW_COUNTS * float(beyond**LAW_POWER), MAX_COUNTS) if beyond > 0 else MAX_COUNTS
 
@@ -206,7 +206,7 @@ class Optics:
         self._poses.values, self._poses.robots, self._poses.objects = poses.address, robots, objects
 
     def signals(self, poses: Poses, robot: int, others: Iterable[int]) -> list[Signal]:
-        """Return the light of `others` at a robot, without those it receives nothing of."""
+        """Return the light of `others` at a robot; senders of which it receives nothing are omitted."""
         self.set_poses(poses)
         found: list[Signal] = []
         for other in others:

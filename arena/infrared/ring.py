@@ -151,7 +151,7 @@ class InfraredRing:
             self._channel.switch(self._robot, self._on_at + cycle, line, bool(levels & changed))
 
     def _on_conversion(self, cycle: int) -> None:
-        """Update the sensors for a conversion that samples at a cycle, if none has in this quantum."""
+        """Update the sensors for a conversion that samples at a cycle; only the first one in a quantum does so."""
         if self._sensing.is_stale:
             if self.poses_source is not None:
                 self._poses = self.poses_source()

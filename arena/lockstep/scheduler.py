@@ -169,7 +169,7 @@ class LockStep:
         return poses
 
     def refresh_poses(self) -> None:
-        """Take over the poses of the world after a body was moved between two quanta."""
+        """Use the world's new poses after a body was moved between two quanta."""
         self._known_poses[self._world.ticks] = self._world.poses
 
     def _step_world(self, ticks: int) -> None:

@@ -142,7 +142,7 @@ class Follower:
         """Return the samples from number `first` on as a trial."""
         whole = self._finished
         if whole is not None:
-            shown = [name for name in whole.columns if not name.startswith(CURVE_COLUMN)]  # a live page has no others
+            shown = [name for name in whole.columns if not name.startswith(CURVE_COLUMN)]  # the columns of rows
             return Trial(whole.path, {name: whole.columns[name][first:] for name in shown}, whole.about)
         rows = self._rows[first:]
         if not rows:

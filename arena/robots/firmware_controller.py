@@ -64,7 +64,7 @@ _TRAP_BIT: Final = 3
 FULL_VOLTS: Final = 4.2
 """Voltage of a full battery (epuck.md §6)."""
 _STRIP_ROWS: Final = range(232, 249)
-"""Rows of the whole picture of which the last one read is recorded."""
+"""Rows of the whole picture: of those that the firmware reads, the last one is recorded."""
 _NOISE_BITS: Final = 14
 """2^14 values of pixel noise are drawn once per robot. Each camera line starts at a random one of them."""
 _DRAWN_BITS: Final = 32
@@ -109,7 +109,7 @@ class FirmwareController:
         board = partial(Epuck, camera=scene.camera.sensor, selector=selector, seed=seed * 1000 + robot)
         self.machine = emu.load(image, board=board)
         self.control: RobotControl = self.machine
-        """Runs the machine; a debugger replaces it while it controls the robot."""
+        """Object that runs the machine. A debugger that controls the robot takes its place."""
         self._board: Epuck = self.machine.board
         assert self._board.camera is not None
         self._board.camera.lamp = scene.light.brightness
@@ -197,7 +197,7 @@ class FirmwareController:
         self.native.attach(self.machine.attach_runner(self._run_native))
 
     def _run_native(self, call: Call, record: int, env: int) -> int:
-        """Run native code by the scheduler, with the fields it needs up to date; return the exit reason.
+        """Update the fields that the scheduler needs and let it run native code; return the exit reason.
 
         Outside the robot's greenlet (a debugger that replays the past) `call` runs it directly.
         """
@@ -385,7 +385,7 @@ class FirmwareController:
             self._line_bytes.append(byte)
 
     def _on_led(self, led: int, cycle: int, changed: int, levels: int) -> None:
-        """Keep a change of a LED. Changes in one cycle become one; a replay of the past adds none."""
+        """Keep a change of an LED. Changes in one cycle become one; a replay of the past adds none."""
         if self.machine.events.quiet:
             return
         if self._sees_leds:

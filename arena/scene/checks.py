@@ -16,9 +16,9 @@ from emu.boards.kilobot.messages import MOST_UID, TYPES
 
 COLOUR: Final = re.compile(r"#[0-9a-fA-F]{6}")
 MOST_SECONDS: Final = 1e7
-"""Longest time of a command of the overhead controller."""
+"""Longest time in seconds of a command of the overhead controller."""
 CONTROLLER: Final = re.compile(r"|A|B|[a-z][a-z0-9_]*|[^\0]+\.py")
-"""Table A or B, entry point, or Python file of a controller."""
+"""Pattern of `controller`: empty, table A or B, an entry point, or a Python file."""
 
 
 class SceneError(ValueError):
@@ -26,7 +26,7 @@ class SceneError(ValueError):
 
 
 class TableErrors:
-    """Creates errors with the line in the file. The TOML parser reports no lines, so it searches table and key."""
+    """Creates errors with the line in the file, found by a search for table and key: the TOML parser reports none."""
 
     def __init__(self, path: str, text: str = "") -> None:
         self._path = path

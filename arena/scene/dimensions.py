@@ -15,15 +15,15 @@ ROBOT_MASS: Final = 0.152
 ROBOT_HEIGHT: Final = 5.5
 """epuck.md §4. The green skirt is assumed to cover all of it (UNVERIFIED)."""
 AXLE: Final = 5.1
-"""Distance of the wheels: 5.1 as in Enki and the published experiment; 5.3 on the site (epuck.md §3, §8)."""
+"""Distance of the wheels: 5.1 in Enki and the published experiment; 5.3 on the e-puck's web site (epuck.md §3, §8)."""
 CM_PER_STEP: Final = 0.0128
 """Travel of a wheel's rim per motor step (epuck.md §3)."""
 WHEEL_SPEED: Final = 12.8
 """Greatest wheel speed, cm/s (epuck.md §3)."""
 THRUST: Final = 1.0
-"""N, both wheels together: 0.7 m g = 1.04, ARGoS limits to 1.5 (epuck.md §3); experiment-contract.md §3 takes 1.0."""
+"""Most force of both wheels, N: 0.7 m g = 1.04, in ARGoS 1.5 (epuck.md §3); experiment-contract.md §3 takes 1.0."""
 BRAKE: Final = 1.04
-"""N needed to push a robot whose wheels are at rest: its tyres must slip, 0.7 m g (epuck.md §3).
+"""Force in N that pushes a robot whose wheels are at rest: its tyres must slip, 0.7 m g (epuck.md §3).
 
 The wheels cannot turn the gears. The value is above THRUST: otherwise one robot could push another for ever.
 """

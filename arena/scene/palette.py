@@ -11,13 +11,13 @@ INK, PAPER = "#222222", "#ffffff"
 BLUE, VERMILION, GREEN, ORANGE, SKY, PURPLE = "#0072b2", "#d55e00", "#009e73", "#e69f00", "#56b4e9", "#cc79a7"
 YELLOW: Final = "#f0e442"
 SEEN: Final = ("#bbbbbb", VERMILION, GREEN)
-"""Robots by the answer of their line-of-sight sensor: nothing, object, robot."""
+"""Colours of robots by the answer of their line-of-sight sensor: nothing, object, robot."""
 OBJECT, PALE_OBJECT, ROBOT = VERMILION, "#fbe3d6", GREEN
-"""Bodies in figures: objects of the largest group, other objects, robots."""
+"""Colours of bodies in figures: objects of the largest group, other objects, robots."""
 GROUPS: Final = (ORANGE, SKY, YELLOW, BLUE, PURPLE, VERMILION, GREEN)
-"""Groups of objects, in turn."""
+"""Colours of groups of objects, used in turn."""
 LINES: Final = (BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY)
-"""Curves of one figure, in turn."""
+"""Colours of the curves of one figure, in their order."""
 
 
 def rgb(colour: str) -> tuple[int, int, int]:

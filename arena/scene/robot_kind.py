@@ -91,7 +91,7 @@ EPUCK: Final = RobotKind("epuck", "robots", dimensions.ROBOT_RADIUS, dimensions.
 TURN_DUTY, STRAIGHT_DUTY = 70, 65
 """Calibrated duties of a nominal Kilobot's motors, of 255, for turning and for straight motion (kilobot.md §1)."""
 LEG_BACK_CM, LEG_ASIDE_CM = 0.9, 1.3
-"""Rear legs of a Kilobot behind and beside its centre (kilobot.md §1)."""
+"""Distances of a Kilobot's rear legs behind and beside its centre (kilobot.md §1)."""
 LEAST_STRENGTH: Final = 0.3
 
 

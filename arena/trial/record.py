@@ -35,7 +35,7 @@ FAULT: Final = (int, float, str)
 FREE_COLUMNS: Final = ("n_", CURVE_COLUMN)
 """Prefixes of the columns whose names and values come from the experiment: noted numbers and curves."""
 MAX_VALUE: Final = 1e7
-"""Bound of all numbers of a record: positions in cm, times in s, speeds, shares. nan is not below it."""
+"""Bound of all numbers of a record: positions in cm, times in s, speeds, shares. nan is refused too."""
 _HEAD: Final = {"scene": dict, "brain": str, "controller": str, "seed": int, "faults": [FAULT], "image_sha256?": str,
                 "controllers_sha256?": dict,
                 "images_sha256?": dict, "versions?": dict, "experiment_sha256?": str, "experiment?": SHAPE}  # fmt: skip

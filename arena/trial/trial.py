@@ -118,7 +118,7 @@ class RunningTrial:
             self._samples += 1
 
     def refresh_poses(self) -> None:
-        """Take over the poses of the world after a body was moved between two quanta."""
+        """Use the world's new poses after a body was moved between two quanta."""
         if self._lockstep is not None:
             self._lockstep.refresh_poses()
 

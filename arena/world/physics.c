@@ -47,7 +47,7 @@ struct drive {
 };
 
 struct robot {
-    void *body, *driven_body, *push_joint, *turn_joint; // pushed body, body the wheels move; no joints: no slip
+    void *body, *driven_body, *push_joint, *turn_joint; // pushed body, body that the drive moves; null joints: no slip
     const struct drive *drive;
     f64 bias[2], noise[2];
     i64 is_braked;

@@ -18,9 +18,9 @@ from arena.scene.loader import FCY
 from emu.native_library import ADDRESS, INT, address_of, functions
 
 WINDOW_S: Final = 0.010
-"""Time over which motor steps are averaged to a speed, at least one quantum."""
+"""Time in s over which motor steps are averaged to a speed, at least one quantum."""
 ROOM: Final = 4096
-"""Quanta whose speeds are kept."""
+"""Number of quanta whose speeds are kept."""
 
 
 class _Drive(Structure):

@@ -10,7 +10,7 @@ from arena.experiments import Curve, Floats, Measure, TrialSamples
 
 TICK_S = 0.032768
 PERIOD_S = 50 * TICK_S
-"""Period of a blink in firmware/kilobot/programs/synchronise.c."""
+"""Time from one blink to the next in firmware/kilobot/programs/synchronise.c."""
 TOGETHER_TICKS = 7.0
 
 CURVES = [

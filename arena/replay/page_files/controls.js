@@ -55,7 +55,7 @@ document.addEventListener("keydown", e => {
   if (e.ctrlKey || e.metaKey || e.altKey || !KEYS[e.key]) return;
   const kind = e.target.type;
   if (kind === "text" || kind === "select-one") return;
-  if ((kind === "button" || kind === "submit" || kind === "checkbox") && e.key === " ") return;  // the browser presses it
+  if ((kind === "button" || kind === "submit" || kind === "checkbox") && e.key === " ") return;  // the browser handles the key
   if (kind === "range" && /^(Arrow|Home|End|Page)/.test(e.key)) return;
   e.preventDefault(); KEYS[e.key](e);
 });

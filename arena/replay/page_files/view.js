@@ -122,7 +122,7 @@ function drawTrails() {
   });
   g.strokeStyle = INK;
 }
-function drawSensors(part) {             // axes of camera and infrared sensors, without what blocks them
+function drawSensors(part) {             // axes of camera and infrared sensors, also through bodies that block them
   d.robots.forEach((r, i) => {
     if (chosen >= 0 && chosen !== i || isKilobot(i)) return;
     const [x, y, a] = pose(i, part), from = d.bodies[i].radius;
