@@ -155,7 +155,7 @@ extern void (*os_expire_timers)(void); /* kernel stack, slice level, after an al
 extern void (*os_feed)(void); /* kernel stack, slice level, after each tick */
 extern void (*os_record_fault)(uint16 fault, uint16 place, uint16 page); /* a fatal fault; everything is masked */
 extern event *(*os_send_hook)(uint16 id, const void *data, uint16 size); /* a sender's event, instead of event_find() */
-extern void (*os_share_hook)(uint16 id, const void *data, uint16 size); /* any context: a sender's event behind a gate */
+extern void (*os_share_hook)(uint16 id, const void *data, uint16 size); /* any context: an event that may be shared */
 
 /* event.c */
 enum { OS_DRIVERS = 0xFFFF }; /* owner of the drivers' subscriptions: the PID of no thread */

@@ -119,7 +119,7 @@ sys_pcb *process_next(const sys_pcb *p)
     return os_blocked;
 }
 
-/* Searches for all PIDs in use end at different positions of the lists. */
+/* Bound of searches for distinct PIDs: each ends at another position of the lists. */
 BOUNDS_AT("} while (", loop n, share start n * (n + 1) / 2);
 sys_pcb *process_find(uint16 pid)
 {

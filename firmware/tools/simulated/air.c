@@ -18,7 +18,7 @@
 enum {
     ROBOTS = 32,
     DELAY = 8,       /* cycles */
-    STRAY = 9,       /* cycles of a noise pulse, as of any other */
+    STRAY = 9,       /* cycles of a noise pulse, equal to those of the link's pulses */
     EMITTERS = 0xC7, /* of port B */
     DARK_MV = 0,
     REFERENCE_MV = 500, /* of the comparator */

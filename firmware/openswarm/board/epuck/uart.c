@@ -70,7 +70,7 @@ static HAL_OUTLINE uint16 fill(uint8 uart)
     return 0;
 }
 
-BOUNDS_AT("while (", loop 6, one); /* four places, the shift register, and a byte that comes meanwhile */
+BOUNDS_AT("while (", loop 6, one); /* four places of the FIFO, the shift register, a byte that arrives meanwhile */
 static HAL_OUTLINE void empty(uint8 uart)
 {
     volatile registers *r = registers_of(uart);

@@ -18,7 +18,7 @@ enum { CPU_OPEN = MIE_MSIE, CPU_ENABLED = MSTATUS_MIE << 1, CPU_SLICE_MS = 10 };
 #define HAL_THREAD_LEVEL CPU_OPEN
 
 extern volatile uint8_t cpu_slice_ms; /* ms left of the slice */
-extern volatile bool cpu_forced;      /* the software interrupt is pending for another reason */
+extern volatile bool cpu_forced;      /* hal_slice_force() requested the software interrupt */
 
 static HAL_INLINE hal_lock_state hal_lock_slice(void)
 {
