@@ -25,7 +25,7 @@ REPEATS: Final = 600
 
 
 class InstructionExecution:
-    """One abstract execution of a function: its instructions."""
+    """Executes the instructions of a function on abstract states."""
 
     def __init__(self, explorer: CallContexts, code: FunctionGraph) -> None:
         self.explorer, self.code = explorer, code

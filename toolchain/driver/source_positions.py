@@ -25,7 +25,7 @@ MAX_POSITIONS = 3  # maximum number of positions shown per symbol
 
 
 def concerns_generated_code(error: ToolError) -> bool:
-    """Whether debug information can add positions to an error: of assembler, back end or linker, or about a handler."""
+    """Whether debug information can add positions to an error of assembler, back end, linker or handler check."""
     return any(
         re.match(r"[^:\n]+: error: ", line)
         or _DUPLICATE.search(line)

@@ -346,7 +346,7 @@ def _linker_words(options: CcOptions, parts: list[str]) -> None:
 
 
 def _tools(options: CcOptions, word: str, words: _ArgumentCursor) -> bool:
-    """Options for the preprocessor and the assembler, and questions about the tools."""
+    """Options for the preprocessor and the assembler, and queries: -print-... and -dump..."""
     if word.startswith("-Wp,"):
         inside = word[4:].split(",")
         words.insert([*inside[:1], "-MF", *inside[1:]] if inside[0] in ("-MD", "-MMD") and inside[1:] else inside)

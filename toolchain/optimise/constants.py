@@ -57,7 +57,8 @@ def _is_call(mi: MI) -> bool:
 
 
 def _share_in_block(b: MBlock, counts: dict[int, int], live: int) -> None:
-    """Reuse the register of an equal constant loaded up to REACH instructions before; keep loads live at the end."""
+    """Reuse the register of an equal constant loaded at most REACH instructions before, in place of a load that is
+    not in `live`."""
     known: dict[LoadKey, tuple[int, int]] = {}
     rename: dict[int, int] = {}
     out: list[MI] = []

@@ -223,7 +223,7 @@ def _make_pointer(
 
 
 def _follows(loop: CountedLoop, home: Block, early: Instr, i: Instr) -> bool:
-    """Whether an address is used after address `early` of block `home`."""
+    """Whether the address `i` is used in the loop after instruction `early` of block `home`, or in another block."""
     behind = home.instrs[home.instrs.index(early) :]
     return any(u in behind for u in _users(loop.f, i)) or any(
         u in b.instrs for u in _users(loop.f, i) for b in loop.body if b is not home
