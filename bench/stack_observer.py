@@ -285,7 +285,7 @@ class Observer:
         Continue in the same way at the deepest moments of the handler that uses the most stack at each level.
         """
         best: dict[int, tuple[int, list[_Moment], int]] = {}
-        """By level: bytes of stack, the handler's deepest moments, handler."""
+        """By level, for the handler that uses the most stack: its bytes, its deepest moments, its address."""
         for lead in LEADS:
             self._restore(moment.since)
             while self.machine.cycle < moment.cycle - lead and self._step():

@@ -121,7 +121,7 @@ def studio(_: Path) -> list[str]:
 def test_pages_are_served_beside_half_a_request(
     tmp_path: Path, words: Callable[[Path], list[str]], status: int
 ) -> None:
-    """The live page has no row of its trial yet and says so (503)."""
+    """A client that sends half a request does not block others. The live page has no data yet, so it answers 503."""
     plan = Plan(scripted(load_scene("clustering")), "scripted", "A", None, 1, 6.0, 1)
     file = LiveFile(live_path(tmp_path, 1), plan.key() | {"seed": 1, "faults": []})
     try:

@@ -25,7 +25,7 @@ POINTERS = [0x900 + 0x40 * n for n in range(10)] + [0x1A00, 0x1A40, 4, 0xC40, 0,
 """Initial values of W0 to W15. W10 and W11 point into Y memory, W12 is the offset of prefetches."""
 STEPS = 3
 NATIVE_STRIDE = 7
-"""The JIT compiles every instruction, so it runs one in NATIVE_STRIDE."""
+"""The JIT runs only every NATIVE_STRIDE-th instruction of the list, because it compiles each one."""
 BRA_SELF = 0x37FFFF
 BYTES = ("se", "ze")
 MOVES = (

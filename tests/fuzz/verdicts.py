@@ -218,7 +218,7 @@ def _worker() -> None:
 
 
 def _exit_with(campaign: int) -> None:
-    """End this process when the campaign's process has ended, which the pool does not do."""
+    """End this process when the campaign's process has ended; the pool would leave it running."""
     while os.getppid() == campaign:
         time.sleep(POLL_S)
     os._exit(1)

@@ -69,7 +69,7 @@ def test_without_make_the_baselines_are_missing_with_a_reason(tmp_path, monkeypa
 @pytest.mark.slow
 @pytest.mark.skipif(shutil.which("cmake") is None, reason="no CMake here (Debian package cmake)")
 def test_make_and_cmake_build_the_same_bytes(tmp_path):
-    """With drivers and definitions of app.mk and sources in sub-folders; both write compile_commands.json."""
+    """Both build equal images with drivers, definitions and sub-folders, and write equal compile_commands.json."""
     project = new(tmp_path / "robot", "--no-baselines")
     source, drivers = project / "src" / "main.c", project / "src" / "drivers" / "near"
     drivers.mkdir(parents=True)

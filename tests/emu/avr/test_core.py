@@ -63,7 +63,7 @@ def test_an_interrupt_takes_four_cycles(machine: Machine) -> None:
 
 
 def test_sleep_ends_with_the_timer(machine: Machine) -> None:
-    """A CPU in Idle wakes at timer 0's compare match; the time between is one stretch of sleep."""
+    """A CPU in Idle wakes at timer 0's compare match; the time until then counts as sleep."""
     m = machine("""
         volatile uint8_t ticks;
         ISR(TIMER0_COMPA_vect) { ticks++; }

@@ -135,8 +135,8 @@ def test_do_loops_nest_once_in_hardware(engine: str) -> None:
     [("first", 1), ("middle", 1), ("penultimate", 2), ("last", 2)],
 )
 def test_edt_ends_the_loop_after_this_iteration_or_the_next(engine: str, place: str, rounds: int) -> None:
-    """isa.md §7.6: EDT ends the loop after the current iteration. Written in the penultimate or last instruction, one
-    more iteration runs."""
+    """isa.md §7.6: EDT ends the loop after the current iteration, or after the next one if the penultimate or last
+    instruction sets it."""
     body = dict.fromkeys(("first", "middle", "penultimate", "last"), "nop")
     body[place] = "mov w4, 0x44"
     text = "do #9, last\ninc w0, w0\n" + "\n".join(f"{name}: {statement}" for name, statement in body.items())

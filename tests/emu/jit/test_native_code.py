@@ -383,8 +383,8 @@ def test_a_timer_that_stops_in_idle_goes_on_behind_it() -> None:
 
 
 def test_a_request_below_the_priority_ends_idle_in_the_same_cycle() -> None:
-    """isa.md §11: a request that is no exception at the CPU's priority ends Idle; execution continues in the cycle of
-    the interpreter."""
+    """isa.md §11: a request with a level not above the CPU's priority ends Idle without an exception, in the same cycle
+    as in the interpreter."""
     sfrs = (("PR1", 99), ("IPC0", 0x4444), ("IEC0", 8), ("T1CON", 0x8000), ("SR", 0xE0))
     firmware, at = started({2: 0, 15: 0x900}, sfrs)
     at = firmware.put(at, words_of("PWRSAV #lit1", k=1) + words_of("BCLR{.B} f, #bit4", f=0x84, b=3))

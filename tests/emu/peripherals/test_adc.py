@@ -269,7 +269,7 @@ def test_a_shorter_setting_ends_sampling_but_not_in_the_past(rig):
 @pytest.mark.parametrize("lanes", [0xFFFF, 0xFF00])
 def test_done_in_a_write_is_what_it_was_in_that_cycle(rig, looks, cycle, done, lanes):
     """§13: writing 1 to DONE, or a byte write above it, keeps the value of DONE in that cycle, whether it was read
-    before or not. With SAMC = 1 and TAD 5 Tcy, the first result is there from cycle 76 to 81."""
+    before or not. With SAMC = 1 and TAD 5 Tcy, DONE is set in cycles 76 to 80."""
     rig.write_all(ADCON2=15 << 2, ADCON3=0x0109, ADCON1=ADON | ASAM | AUTO)
     rig.at(cycle)
     if looks:

@@ -59,7 +59,7 @@ class Generator:
     """Draws one program."""
 
     def __init__(self, random: Random, families: list[str] | None = None, later: float = 0.3) -> None:
-        """families: of FAMILIES; a few drawn ones by default. later: share of programs with an interrupt in a call."""
+        """families: of FAMILIES, by default a few random ones. later: share of programs with an interrupt in a call."""
         self.random, self.later = random, later
         self.families = families or random.sample(sorted(FAMILIES), random.choice((1, 2, 2, 3, 3, 4)))
         self.calls = [code for family in self.families for code in FAMILIES.get(family, REMOTE)]

@@ -37,9 +37,9 @@ class Sizes:
     event: int
     subscription: int
     message: int
-    """In front of the payload."""
+    """Header in front of the payload of a message."""
     period: int
-    """In front of the stack of a periodic thread."""
+    """Control data in front of the stack of a periodic thread."""
     default_stack: int
     minimum_stack: int
     small_payload: int

@@ -123,7 +123,7 @@ def test_a_source_whose_name_is_no_text_is_compiled(
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="pipes of POSIX")
 def test_a_pipe_is_no_source(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
-    """The first reader of a pipe takes its content, so that the next would compile an empty text."""
+    """A pipe is refused: its first reader takes the content, so the next one would compile an empty text."""
     os.mkfifo(tmp_path / "main.c")
     status, said = cc(capsys, "-c", tmp_path / "main.c", "-o", tmp_path / "out.o")
     assert (status, said.count("\n")) == (2, 1)
