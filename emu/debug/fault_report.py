@@ -43,7 +43,7 @@ TRAPS: Final = {
     "StackError": ("STKERR", "stack error trap"),
     "MathError": ("MATHERR", "math error trap"),
 }
-"""By the vector name of each trap: its flag in INTCON1 (isa.md §14.4) and its description."""
+"""Flag in INTCON1 (isa.md §14.4) and description of each trap, by the name of its vector."""
 STOP_FUNCTION: Final = "hal_stop"
 """Function in which OpenSwarm halts after a failed assertion or a fatal trap (firmware/openswarm/hal/hal_cpu.h)."""
 REPORTING_FUNCTIONS: Final = frozenset(
@@ -334,7 +334,7 @@ def _detailed_cause(machine: Machine, case: _Case, trace: ExecutionTrace | None)
         why = "an odd address" if size == 2 and address & 1 else "where no memory is"
         verb = "writing" if is_write else "reading"
         return case.cause.replace("trap", f"trap: {verb} {size} byte{'s' * (size > 1)} at {address:#06x}, {why}", 1)
-    if case.vector.name == "StackError":  # an access above the limit; W15 is still below
+    if case.vector.name == "StackError":  # the access is above the limit, W15 itself is still below it
         return f"stack overflow ({case.cause.rstrip(',')}),"
     return case.cause
 

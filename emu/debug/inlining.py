@@ -16,7 +16,7 @@ REMEDY: Final = "add __attribute__((noinline)) or build with -fno-inline-functio
 
 
 def address_of(debug: DebugInfo, name: str) -> int | None:
-    """Return the address of a function's copy that has code of its own, by its C name; None if there is none."""
+    """Return the address of a function's out-of-line copy, by the C name; None if there is none."""
     return next((one.ranges[0][0] for one in debug.functions if one.name == name), None)
 
 

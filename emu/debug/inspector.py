@@ -62,7 +62,7 @@ class Inspector:
         self.machine: Final = machine
         self.image: Final[Image] = machine.image
         self.processor: Final[Processor] = machine.processor() if isinstance(machine, Debugged) else Dspic30f(machine)
-        """What distinguishes the machine's processor and compiler."""
+        """Properties of the machine's processor and compiler."""
         self._bodies: Final[dict[int, int]] = {}
 
     @cached_property

@@ -30,7 +30,7 @@ ENTRY: Final = np.dtype([("cycle", "<u8"), ("pc", "<u4"), ("site", "<u4"), ("num
 ROOM: Final = 4096
 """Number of entries after which native code returns, so that the consumer is called."""
 BOUNDARY: Final = 0xFFFFFF
-"""Address of the instruction for a change by a hook or a boundary, for example by the entry of an interrupt."""
+"""`Change.site` of a change that a hook or a boundary has made, for example the entry of an interrupt."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,7 +99,7 @@ class ChangeLog:
         """Address and size of the stores that the sequencer has made since the last check."""
         self._consumer: Final = consumer
         self.first: Final = SEEN + len(self.watched)
-        """Word of the first entry."""
+        """Index of the first entry's first word."""
         self._words: Final = (ctypes.c_uint64 * (self.first + ENTRY_WORDS * (ROOM + 2 * len(self.watched))))()
         self._entries: Final[Entries] = np.frombuffer(memoryview(self._words).cast("B"), ENTRY, offset=8 * self.first)
         self.address: Final = ctypes.addressof(self._words)

@@ -81,7 +81,7 @@ class WaveformRecorder:
         self._logged = machine.cycle
         """Cycle up to which the edges of waveforms are in the log."""
         self._framed: Final = [0] * len(PORTS)
-        """Pins that were logged by their waveform, whose static level does not count while it is attached."""
+        """Masks by port of pins with logged frames. While such a pin has a waveform, its static level is ignored."""
         self._waveform_pins = pins.waveform_pins.tolist()
         self._removals.append(pins.on_waveform_change(self._log_waveforms, self._log_detached))
 

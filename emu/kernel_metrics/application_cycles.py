@@ -242,7 +242,7 @@ class _Run:
             return  # the queue is empty again
         event, _size = kernel.message(machine, new)
         if not event:
-            return  # a driver returns a block
+            return  # not a message: a block that a driver returns to the kernel
         begin = self._sending.pop(self._sender(), None) or self._window()
         self._sent[new] = _Sent(begin.begin, kernel.event_id(machine, event), begin.exceptions)
         for _pid, pointer in kernel.subscriptions(machine, event):
@@ -254,7 +254,7 @@ class _Run:
     def _handler_begins(self, name: str) -> None:
         sent = self._sent.get(self._machine.w[DATA_REGISTER])
         if sent is None or sent.event != self._machine.w[EVENT_REGISTER]:
-            return  # called by the application itself
+            return  # the application calls the handler itself
         to = f"{event_name(sent.event)}: send to {name}"
         self._add(to, _Window(sent.cycle, sent.exceptions), self._machine.cycle)
         self._begin_call(f"handler {name}")

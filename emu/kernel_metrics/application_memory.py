@@ -97,7 +97,7 @@ class _Run:
             self._event(self.machine.w[0]).line = line
 
     def _main_starts(self) -> None:
-        """Paint the unused stack of `main`, which the kernel does not."""
+        """Paint the unused stack of `main`, which the kernel does not paint."""
         if self._stack_of_main:
             return
         top, end = self.machine.w[15], self.machine.state.splim + WORD

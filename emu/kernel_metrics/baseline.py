@@ -17,7 +17,7 @@ from emu.host.files import atomic_text_file, read_file
 
 SCHEMA: Final = "openswarm-baseline"
 VERSION: Final = 2
-"""Version of the file format. Files of version 1 had no schema."""
+"""Version of the file format. Files of version 1 have no key `schema`."""
 _LIMIT: Final = re.compile(r"at (least|most) (\d{1,9}(?:\.\d{1,3})?)( ?%)?")
 _LIMIT_FORM: Final = '"at least 20 %" or "at most 400"'
 _KEYS: Final = frozenset(("schema", "version", "command", "conditions", "rows", "code"))

@@ -125,7 +125,7 @@ class CodeListing:
         return file, line
 
     def _text(self, text: str) -> str:
-        """Return a normalised instruction; a literal that is an address of the image has no value."""
+        """Return a normalised instruction, with `#address` for a literal that is an address of the image."""
         literal = _LITERAL.search(text)
         if literal is not None and self._is_address(int(literal[1], 16)):
             text = text.replace(literal[0], "#address")

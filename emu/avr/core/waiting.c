@@ -22,9 +22,9 @@ static void loop_on_itself(struct avr *m)
 
 // A loop that only counts registers down: SBIW, DEC or SUBI with SBCI, and BRNE back to it.
 struct countdown {
-    u64 cycles; // of an iteration
-    u32 bytes;  // of the counter
-    u32 is_word; // counted by SBIW
+    u64 cycles;  // cycles of an iteration
+    u32 bytes;   // size of the counter
+    u32 is_word; // whether SBIW counts a register pair
     u8 registers[4];
 };
 

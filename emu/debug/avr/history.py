@@ -24,7 +24,7 @@ class KilobotHistory(History):
         return self._kilobot.step(limit)
 
     def _last_write(self, begin: StoredState, end: int, address: int, size: int, changes: bool) -> Write | None:
-        """Return the last change before cycle `end`; a write that changes nothing is not seen."""
+        """Return the last change before cycle `end`; a write of an equal value is not detected."""
         kilobot, found = self._kilobot, None
         with self._replaying(), kilobot.watching(address, size):
             kilobot.restore_state(self._unpacked(begin))

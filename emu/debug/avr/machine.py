@@ -95,7 +95,7 @@ class _Uart:
 
 
 class DebuggedKilobot:
-    """A robot at power-on. `uid` and `command` as of `SingleKilobot`."""
+    """A robot at power-on. `uid` and `command` are those of `SingleKilobot`."""
 
     engine: Final = "avr"
 

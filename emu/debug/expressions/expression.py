@@ -365,7 +365,7 @@ class _Parser:
         raise ExpressionError(f"{self.text!r}: {text!r} is not expected there")
 
     def _fraction(self, text: str) -> TypedNumber:
-        """Return a floating-point constant as the program's `double`, which some compilers make as short as float."""
+        """Return a floating-point constant as the program's `double`, which some compilers make a `float`."""
         kind = FLOAT if text[-1] in "fF" else self.inspector.debug.type("double") or FLOATING
         return TypedNumber(float(convert(float(text.rstrip("fFlL")), kind)), kind)
 

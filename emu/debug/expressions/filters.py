@@ -21,7 +21,7 @@ _INT_BITS: Final = 16
 _W_END: Final = 2 * REGISTERS
 """First data address after the memory-mapped W registers (isa.md §1.2)."""
 _PROBES: Final = tuple(tuple(0x2000 + 0x100 * n + step * (n + 1) for n in range(REGISTERS)) for step in (0, 2))
-"""Two sets of register values. An address that moves by 2 (n + 1) between them is a constant distance from Wn."""
+"""Two sets of register values. An address that moves by 2 (n + 1) between them has a constant distance from Wn."""
 Token = tuple[str, str]
 
 

@@ -96,7 +96,7 @@ class CycleCounting:
         return AccountingBoundaryCounter(self._accounting.words, self._accounting.tail)
 
     def identity(self, region: Region) -> Any:
-        """Return the source lines of the region's instructions."""
+        """Return the first addresses of the source lines of the region's instructions."""
         return [self._row_of(at) for at in sorted(region.steps)]
 
 
@@ -148,7 +148,7 @@ class ExecutionCounting:
         return BoundaryCounter()
 
     def identity(self, region: Region) -> Any:
-        """Return a mark; the counter depends on nothing else."""
+        """Return the kind of counting and the layout of the cells, on which the counter's code depends."""
         return f"executions {self._words}"
 
 
@@ -210,9 +210,9 @@ class InstructionLogging:
         return InstructionCounter()
 
     def boundary_counter(self) -> BoundaryCounter:
-        """Return the counter of native boundaries, of which there are none."""
+        """Return the counter that leaves all boundaries to the sequencer."""
         return InstructionBoundaryCounter()
 
     def identity(self, region: Region) -> Any:
-        """Return a mark; the counter depends on nothing else."""
+        """Return the kind of counting, on which alone the counter's code depends."""
         return "instructions"

@@ -59,7 +59,7 @@ KERNEL_PARTS: Final = {
 although notifications need it, too."""
 OBJECTS: Final = {"sys_mutex": "mutex", "sys_cleanup": "cleanup", "sys_quota": "quota", "sys_service": "service",
                   "sys_semaphore": "semaphore", "sys_notification": "notification", "sys_timer": "timer"}  # fmt: skip
-"""By object type: NAME of the application's variable `options_NAME` of that type."""
+"""NAME of the application's variable `options_NAME`, by the type of the variable."""
 HEAP: Final = (("a quota", "LIMIT", "options_done"), ("a zombie", "JOIN_ZOMBIE", "options_done"))
 """(name, scene, symbol): each row is the change of heap use while the scene runs from `options_ready` to the symbol."""
 _ENDS_LATER: Final = ("END", "END_JOINED", "END_CLEANED", "TICK", "TICK_SERVICE", "TICK_TIMER")

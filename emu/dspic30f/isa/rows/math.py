@@ -45,7 +45,7 @@ def first_one_right(m: Builder, x: Operands) -> None:
 
 
 def first_bit_change(m: Builder, x: Operands) -> None:
-    """Store minus the number of bits below the sign bit that equal it."""
+    """Store the negated number of consecutive bits below the sign bit that equal the sign bit."""
     v = m.let(source(m, x, 2).read())
     same = m.let(m.clz16(v ^ (v >> 15) * 0xFFFF) - 1)
     search(m, x, -same, same == 15)

@@ -31,7 +31,7 @@ class ChangeCounter(CycleCounter):
         self._ram: Final = ram
         self.checks_asleep = "asleep" in log.watched
         self._hits: Number = 0
-        """Bit n is set if the instruction has stored to watched number n; used if unchanged values are logged too."""
+        """Bit n is set if the instruction has stored to watched number n; used with `ChangeLog.every_write` only."""
 
     def begin(self, emitter: Emitter, offset: Mapping[str, int]) -> None:
         """Prepare for the function that `emitter` writes."""

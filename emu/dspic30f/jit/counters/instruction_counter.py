@@ -56,6 +56,6 @@ class InstructionCounter(CycleCounter):
 
 
 class InstructionBoundaryCounter(BoundaryCounter):
-    """Counter for code without native boundaries."""
+    """Counter that leaves all boundaries to the sequencer."""
 
     is_native = False
