@@ -60,7 +60,7 @@ def compare_runs(first: list[Trial], second: list[Trial], at: float) -> dict[str
 
 
 def _distances(pairs: list[Any]) -> list[dict[str, float]]:
-    """Return the median and the maximum distance in cm between robots of one number in trials with equal seeds."""
+    """Return the median and the maximum distance in cm between robots with equal numbers in trials with equal seeds."""
     found = []
     for seconds in APART_S:
         gaps: list[float] = []

@@ -210,8 +210,8 @@ static f64 response(const struct optics *o, f64 millimetres)
     return after ? o->counts[after - 1] * exp(o->slope[after - 1] * (millimetres - o->near[after - 1])) : o->counts[0];
 }
 
-// Compute the surface that a sensor faces, as `cast`. Several rays become one surface at the nearest distance, with the
-// share by which the rays reflect what they would reflect from a white wall across the axis at this distance.
+// Compute the surface that a sensor faces, as `cast`. Several rays become one surface at the distance of the nearest
+// hit. Its share is the sum of their reflections, divided by that of a white wall across the axis there; at most 1.
 static void surface(const struct optics *o, const struct poses *p, i64 own, i64 sensor, f64 *found)
 {
     f64 axis = p->values[3 * own + 2] - o->bearings[sensor], nearest = __builtin_inf(), sum = 0, white = 0;

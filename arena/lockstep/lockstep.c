@@ -3,7 +3,7 @@
 // This is the loop of scheduler.py. A robot's native code runs until a camera line is read, a quantum ends, the CPU is
 // probed or infrared sensors need the poses of the next quantum; this file handles these four. For every other exit
 // reason Python continues with the robot. Between two steps of the world, robots share only the histories of their
-// emitters (light.c), of which others read no part that is still written. So several threads can run them.
+// emitters (light.c), of which others read complete changes only. So several threads can run them.
 
 #include <stdint.h>
 

@@ -211,7 +211,7 @@ class ScriptedController(ControllerWithoutUart):
         return old[0] + share * (new[0] - old[0]), old[1] + share * (new[1] - old[1])
 
     def _with_errors(self, seen: int) -> int:
-        """Return an answer of the line-of-sight sensor, or a false one as often as the scene has them."""
+        """Return an answer of the line-of-sight sensor, or a false one with the scene's probability."""
         if seen != NOTHING and self._false_negative and self._rng.random() < self._false_negative:
             return NOTHING
         if seen == NOTHING and self._false_positive and self._rng.random() < self._false_positive:

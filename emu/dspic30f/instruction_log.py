@@ -30,9 +30,9 @@ ENTRY_BYTES: Final = ENTRY.itemsize
 RUN_CYCLES: Final = 8192
 """Maximum length in Tcy of a native run, which logs at most one entry per cycle."""
 ROOM: Final = 4 * RUN_CYCLES
-"""Capacity in entries."""
+"""Capacity of the log in entries."""
 _RESERVE: Final = RUN_CYCLES + 64
-"""Entries for a native run, including those of instructions that it then leaves to the sequencer."""
+"""Free entries that a native run needs, including those of instructions that it then leaves to the sequencer."""
 
 Entries = npt.NDArray[np.void]
 

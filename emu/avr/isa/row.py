@@ -41,7 +41,7 @@ FIELDS: Final[Mapping[str, Field]] = {
     "q": Field("q"),
     "k": Field("k"),
 }
-"""Registers of each set: AVR instruction set manual, description of the row's instruction."""
+"""Meaning of each pattern letter. The AVR instruction set manual names the register set of each instruction."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -72,7 +72,7 @@ def _literal_comparison(
         return None
     try:
         number = int(literal.rstrip("lL"), 0)
-    except ValueError:  # a suffix `u`, or an octal number
+    except ValueError:  # the literal has a suffix `u`, or is octal
         return None
     bits = max(8 * place.size, _INT_BITS)
     low, high = (-(1 << bits - 1), (1 << bits - 1) - 1) if place.is_signed else (0, (1 << bits) - 1)
