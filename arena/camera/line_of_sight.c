@@ -3,13 +3,13 @@
 //
 // A grid over the bodies lets a look test only the bodies near its rays, nearest first, until every ray has ended.
 
-enum { WINDOW = 24 }; // most rays of a look
+enum { WINDOW = 24 }; // maximum number of rays of a look
 
 // Cells over the centres of all bodies: robots, then objects. Cell n has the bodies numbers[first[n]] to
 // numbers[first[n + 1] - 1]. visited[n] is the last look that tested them.
 struct grid {
     f64 left, low, cell;    // lower left corner, length of a side
-    f64 radius, height;     // greatest of all bodies
+    f64 radius, height;     // of the largest and of the highest body
     i64 columns, rows, robots, bodies, looks;
     i64 *first, *numbers, *visited;
 };
@@ -127,7 +127,7 @@ static i64 clamped(f64 value, i64 end)
 static void test_band(struct view *v, const f64 *poses, const struct rays *rays, struct beam *beams, struct grid *g,
                       f64 from, f64 to)
 {
-    f64 side = 1.2 * g->radius; // more than in `can_hit`
+    f64 side = 1.2 * g->radius; // a wider margin than in `can_hit`
     f64 corners[4][2] = {{from, min(rays->right_most * from, rays->right_most * to) - side},
                          {to, min(rays->right_most * from, rays->right_most * to) - side},
                          {from, max(rays->left_most * from, rays->left_most * to) + side},

@@ -27,7 +27,7 @@ WINDOW_ROWS: Final = tuple(160 + 8 * y for y in (4, 6, 8, 10, 12, 14))
 """The 24 pixels of the line-of-sight sensor in the whole picture. The clustering firmware takes every 8th pixel of the
 160 x 160 in the middle (openswarm-original.md §8, revision A)."""
 VOTES: Final = 2
-"""Pixels that must show an object or a robot for the sensor to report it."""
+"""Minimum number of pixels that must show an object or a robot for the sensor to report it."""
 
 
 class _GridStruct(Structure):
@@ -66,7 +66,7 @@ class _Grid:
         self._poses: Poses | None = None
 
     def fill(self, poses: Poses) -> None:
-        """Sort the bodies at `poses` into cells, unless that was done last."""
+        """Sort the bodies at `poses` into cells, unless the grid already holds these poses."""
         if poses is not self._poses:
             self._poses = poses
             _code()["fill_grid"](self.address, poses.address, *poses.counts[:2])

@@ -262,7 +262,7 @@ static struct disc in_camera_frame(const struct view *v, const struct disc *fixe
     return found;
 }
 
-// Whether a ray with a slope from `right` to `left` can hit a disc. Errs on the side of yes.
+// Whether a ray with a slope from `right` to `left` may hit a disc; also true for some rays that miss it.
 static int can_hit(const struct disc *disc, f64 right, f64 left)
 {
     return disc->left - 1.1 * disc->radius <= left * disc->ahead &&

@@ -121,7 +121,7 @@ class SceneBodies:
              lit: int | None) -> View:  # fmt: skip
         """Return the view of robot `own`, whose camera is mounted with `traits`.
 
-        `robots` are the discs of the robots, `room` is room for the discs in view, and `lit` is the address of the lit
+        `robots` are the discs of the robots, `room` is space for the discs in view, and `lit` is the address of the lit
         LEDs of each robot.
         """
         sides = (Side * (len(self.outlines) + sum(map(len, self.polygon_corners))))()

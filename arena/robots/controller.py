@@ -63,8 +63,8 @@ class Reading:
     load: float = 0.0
     """Share of the CPU's cycles since the last sample that were not idle."""
     leds: int = 0
-    """Of an e-puck bit n: ring LED n; 8 front, 9 body. Of a Kilobot its colour: red + 4 green + 16 blue, each 0 to
-    3."""
+    """LEDs of an e-puck: bit n is ring LED n, bit 8 the front LED, bit 9 the body LED. Of a Kilobot the colour of its
+    LED: red + 4 green + 16 blue, each 0 to 3."""
     strip: bytes = b""
     """Red, green, blue of at most STRIP_PIXELS pixels in STRIP_COLUMNS, left to right, of the last line near the middle
     of the picture that the firmware read: with noise, before the sensor's gains. Empty if it read none."""
