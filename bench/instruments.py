@@ -61,6 +61,16 @@ def hook(place: str) -> Run:
     return run
 
 
+def arrivals(place: str, log: bool = True) -> Run:
+    """Return a run that counts arrivals at a place and, with `log`, logs their cycles and a number."""
+
+    def run(machine: emu.Machine, cycles: int) -> None:
+        with emu.Arrivals(machine, place, values=["rounds"], log=log):
+            machine.run(cycles=cycles)
+
+    return run
+
+
 def breakpoint_if(condition: str) -> Run:
     """Return a run with a conditional breakpoint of the debugger, whose condition never holds."""
 
@@ -126,6 +136,10 @@ RUNS: dict[str, tuple[Run, float]] = {
     "coverage": (coverage, 1),
     "hook in Python, every 500 Tcy": (hook("mark"), 0.05),
     "hook in Python, inner loop": (hook("inner"), 0.01),
+    "arrivals counted, every 500 Tcy": (arrivals("mark", log=False), 1),
+    "arrivals counted, inner loop": (arrivals("inner", log=False), 1),
+    "arrivals logged, every 500 Tcy": (arrivals("mark"), 1),
+    "arrivals logged, inner loop": (arrivals("inner"), 0.2),
     "break if, global": (breakpoint_if("rounds == 1"), 1),
     "break if, SFR and register": (breakpoint_if("TMR1 > 5 && W15 > 0x8000"), 1),
     "until at a place": (lambda machine, cycles: machine.run(cycles=cycles, until="mark", when="rare == 65535"), 1),

@@ -31,6 +31,8 @@ if TYPE_CHECKING:
     from emu.image.loader import load_image as load_image
     from emu.image.model import Image as Image
     from emu.image.model import LoadError as LoadError
+    from emu.instruments.arrivals import Arrival as Arrival
+    from emu.instruments.arrivals import Arrivals as Arrivals
     from emu.machine.stops import Stop as Stop
 
 FCY_HZ: Final = 14_745_600
@@ -41,6 +43,8 @@ TCY_SECONDS: Final = 1 / FCY_HZ
 # A module is imported when one of its names is first used. Tools that need only the instruction table or the chip's
 # data therefore start faster.
 _MODULES: Final = {
+    "Arrival": "emu.instruments.arrivals",
+    "Arrivals": "emu.instruments.arrivals",
     "BuildError": "emu.api",
     "Change": "emu.api",
     "Image": "emu.image.model",
@@ -56,6 +60,8 @@ _MODULES: Final = {
 __all__ = [
     "FCY_HZ",
     "TCY_SECONDS",
+    "Arrival",
+    "Arrivals",
     "BuildError",
     "Change",
     "Image",

@@ -7,6 +7,7 @@ from typing import Final
 MODULES: Final = (
     "emu",
     "emu.api",
+    "emu.instruments.arrivals",
     "emu.machine.machine",
     "emu.machine.fault",
     "emu.boards.epuck.board",

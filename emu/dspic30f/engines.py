@@ -35,6 +35,9 @@ class Engine(Protocol):
     def forget(self) -> None:
         """Discard translations because the set of hooked addresses has changed."""
 
+    def skip_hooks_at(self, cycle: int) -> None:
+        """Do not record the arrival at the instruction that starts in `cycle`: its hooks have been called."""
+
     def pass_limits(self, period: int, last: int) -> None:
         """Let native code pass limits without returning.
 
@@ -70,6 +73,9 @@ class PlainEngine:
 
     def forget(self) -> None:
         """Do nothing, because this engine keeps no translations."""
+
+    def skip_hooks_at(self, cycle: int) -> None:
+        """Do nothing, because the machine calls all hooks."""
 
     def pass_limits(self, period: int, last: int) -> None:
         """Do nothing, because this engine returns at every limit."""

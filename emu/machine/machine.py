@@ -173,6 +173,7 @@ class Machine(StateAccess):
     def pc(self, address: int) -> None:
         self.state.pc = address & PC_MASK
         self.state.stall = 0
+        self._set_last_hook_stop(self._last_hook_stop)
 
     def _connect(self, wires: CpuSignals) -> None:
         """Connect the signals between the CPU and the peripherals."""
@@ -453,7 +454,7 @@ class Machine(StateAccess):
         """Call the hooks of the current PC. Return a `Stop` if one requests it, at most once per arrival."""
         here = (self.state.pc, self.state.cycle)
         if self._last_hook_stop == here:
-            self._last_hook_stop = None
+            self._set_last_hook_stop(None)
             return None
         self._bring_devices_to_present()
         if self.events.quiet:
@@ -463,10 +464,14 @@ class Machine(StateAccess):
             hit = bool(hook()) or hit
         if not hit:
             return None
-        self._last_hook_stop = here
+        self._set_last_hook_stop(here)
         if self._has_restarted():
             return self._diagnosed(self.stopped("fault", RESTART))
         return self.stopped("breakpoint")
+
+    def _set_last_hook_stop(self, place: tuple[int, int] | None) -> None:
+        self._last_hook_stop = place
+        self.runner.skip_hooks_at(self.cycle if place == (self.pc, self.cycle) else NEVER)
 
     def _has_restarted(self) -> bool:
         """Whether the PC has reached address 0 without a reset.
@@ -551,7 +556,7 @@ class Machine(StateAccess):
     def restore(self, state: bytes) -> None:
         """Continue from a snapshot of an equally wired machine with any engine. Raises ValueError for another size."""
         self.restore_state(state)
-        self._last_hook_stop = None
+        self._set_last_hook_stop(None)
         self.checkpoints.trap = None
 
     def save_state(self) -> bytes:
@@ -576,7 +581,7 @@ class Machine(StateAccess):
         )  # fmt: skip
 
         def restore() -> None:
-            self._last_hook_stop = hook_stop if hook_stop == (self.pc, self.cycle) else None
+            self._set_last_hook_stop(hook_stop if hook_stop == (self.pc, self.cycle) else None)
             self._last_reset, self._interrupt = last_reset, interrupt
             self.resets[:] = resets
 

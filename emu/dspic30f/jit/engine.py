@@ -26,6 +26,7 @@ from emu.dspic30f.jit.cold_runner import ColdRunner
 from emu.dspic30f.jit.compiler import LoadedCode, shared_compiler
 from emu.dspic30f.jit.environment import (
     ACCOUNTING,
+    ARRIVALS,
     AT_BOUNDARY,
     BLOCKS,
     ENV_WORDS,
@@ -40,6 +41,7 @@ from emu.dspic30f.jit.environment import (
     PERIOD,
     REFRESHED,
     RESUME,
+    SEEN,
     STEPS,
 )
 from emu.dspic30f.jit.exit_reasons import BOUNDARY_WORK, DEADLINE, HOOK, INTERPRET, MISS, RETFIE, UNFINISHED
@@ -54,6 +56,8 @@ from emu.dspic30f.jit.machine_layout import (
 from emu.dspic30f.jit.translate.region import Region, discover
 from emu.dspic30f.state.modes import Key, Modes
 from emu.dspic30f.state.state import IPL3, NOT_REPEATING, RUN
+from emu.system.arrivals import ArrivalHook, ArrivalLog, Recording
+from emu.system.events import NEVER
 from emu.system.filters import Filter
 from emu.system.native_handle import FRESH_ROOM, Native, Run
 from emu.system.rules import Rule
@@ -156,6 +160,8 @@ class JitEngine:
         """Tcy of native runs since the last sample of `HotRegions`."""
         self._warm_at = 0 if TRANSLATOR in sys.modules else WARM_UP
         self._counting: Counting | None = None
+        self._arrivals: ArrivalLog | None = None
+        """Log of arrivals to which native code appends."""
         self._count_key: object = None
         """Value that distinguishes the code of one `start_counting` from that of every other one."""
         self._state: Final = core.state
@@ -164,6 +170,7 @@ class JitEngine:
         self.compiler = shared_compiler()
         self._computed: Final[dict[int, int]] = {}
         self._env: Final = (ctypes.c_uint64 * ENV_WORDS)()
+        self._env[SEEN] = NEVER
         self._env_address: Final = ctypes.addressof(self._env)
         self._codes: Final[dict[object, CodeTable]] = {}
         self._indirect_sfr: Final[dict[object, LoadedCode]] = {}
@@ -197,6 +204,8 @@ class JitEngine:
         state = self._state
         if self._counting is not None:
             self._counting.after_hooks()
+        if self._arrivals is not None:
+            self._env[ARRIVALS] = 0 if self._core.events.quiet else self._arrivals.address
         if state.edt or self._core.events.deadline < state.cycle:  # a hook called `kick` after the boundary
             self._core.sequencer.execute()
             return
@@ -246,6 +255,8 @@ class JitEngine:
             return False
         if self._counting is not None and self._counting.is_exact:
             return False
+        if self._arrivals is not None:
+            self._env[ARRIVALS] = 0 if self._core.events.quiet else self._arrivals.address
         if self.compiler.busy:
             self._collect()
         self._select()
@@ -304,6 +315,10 @@ class JitEngine:
             if region is not None:
                 self.counts.hot += 1
                 self._compile(self._code, region, exact=False, level=HOT_LEVEL)
+
+    def skip_hooks_at(self, cycle: int) -> None:
+        """Implement `Engine.skip_hooks_at`."""
+        self._env[SEEN] = cycle
 
     def pass_limits(self, period: int, last: int) -> None:
         """Let native code pass limits without returning, as `Engine.pass_limits` specifies."""
@@ -440,6 +455,8 @@ class JitEngine:
 
     def forget(self) -> None:
         """Discard the translations, because the hooked addresses at which native code returns have changed."""
+        hooks = (hook for hooks in self._hooks.values() for hook in hooks if isinstance(hook, ArrivalHook))
+        self._arrivals = next((hook.log for hook in hooks), None)
         self._codes.clear()
         self._forget_computed()
         self._key = None
@@ -487,13 +504,14 @@ class JitEngine:
 
     def _new_code(self, key: Key) -> CodeTable:
         core = self._core
-        layout = machine_layout(core, key, frozenset(self._hooks), self._offset, self._filters())
+        layout = machine_layout(core, key, frozenset(self._hooks), self._offset, self._filters(), self._recorded())
         if self._wiring[0] != core.bus.rules:
             self._wiring = core.bus.rules[:], wiring_hash(layout)
         identity = translation_hash(key.context, layout, self._wiring[1])
         program = hashlib.sha256(core.program.flash).digest()
         switches = core.bus.off, frozenset(core.bus.watched), self.wait, self._count_key, self.share_group
-        shared = identity, program, layout.hooks, frozenset(layout.filters.items()), *switches
+        hooked = layout.hooks, frozenset(layout.filters.items()), frozenset(layout.recorded.items())
+        shared = identity, program, *hooked, *switches
         code = _shared.get(shared)
         if code is None:
             table = ctypes.c_uint64 * self._words
@@ -505,6 +523,15 @@ class JitEngine:
         """Return the filters of the addresses at which every hook has one."""
         known = {pc: tuple(one for one in filters if one is not None) for pc, filters in self._pc_filters.items()}
         return {pc: some for pc, some in known.items() if some and len(some) == len(self._pc_filters[pc])}
+
+    def _recorded(self) -> dict[int, Recording]:
+        """Return what native code records at the addresses whose only hook belongs to the log of arrivals."""
+        only = {pc: hooks[0] for pc, hooks in self._hooks.items() if len(hooks) == 1}
+        return {
+            pc: hook.recording
+            for pc, hook in only.items()
+            if isinstance(hook, ArrivalHook) and hook.log is self._arrivals
+        }
 
     def _indirect_sfr_code(self, layout: MachineLayout) -> LoadedCode:
         """Return the helper for indirect SFR access."""
@@ -558,8 +585,8 @@ class JitEngine:
         """Install code of a region, at `level` or better, or request it from the compile process."""
         from emu.dspic30f.jit.translate.function import Translator
 
-        filters, counting = code.layout.filters, self._counting
-        hooked = [(pc, filters[pc]) if pc in filters else pc for pc in sorted(code.layout.hooks & region.steps.keys())]
+        known_at, counting = {**code.layout.filters, **code.layout.recorded}, self._counting
+        hooked = [(pc, known_at.get(pc)) for pc in sorted(code.layout.hooks & region.steps.keys())]
         counted = counting.identity(region) if counting is not None else None
         identity = repr((region.words(), sorted(region.leaders), region.start, hooked, counted)).encode()
         kind = b"exact" if exact else b"block"

@@ -35,7 +35,11 @@ ARRIVED: Final = 10
 of that access."""
 INDIRECT_SFR: Final = 11
 """Address of the helper function for indirect SFR access."""
-PASSED: Final = 12
+ARRIVALS: Final = 12
+"""Address of the log of arrivals (emu/system/arrivals.py); 0 while nothing is recorded."""
+SEEN: Final = 13
+"""Start cycle of an instruction whose hooks Python called before an earlier run ended; NEVER if there is none."""
+PASSED: Final = 14
 """First entry of a list: the boundaries (Tcy) at or after each passed limit."""
 PASSED_ROOM: Final = 1024
 """Capacity of the list PASSED."""

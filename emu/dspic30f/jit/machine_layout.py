@@ -12,6 +12,7 @@ from emu.dspic30f.interpreter import flow_rules
 from emu.dspic30f.isa.builder import Context
 from emu.dspic30f.state.data_space import W_END
 from emu.dspic30f.state.modes import REGISTERS, Key
+from emu.system.arrivals import Recording
 from emu.system.filters import Filter
 from emu.system.rules import Rule
 
@@ -76,6 +77,8 @@ class MachineLayout:
     """Hooked program addresses, before which native code returns to Python."""
     filters: Mapping[int, tuple[Filter, ...]] = field(default_factory=dict)
     """Filters of hooked addresses: native code passes the address if none of them holds."""
+    recorded: Mapping[int, Recording] = field(default_factory=dict)
+    """Hooked addresses at which native code records arrivals and does not return to Python."""
     do_start: int = -1
     """Address of the active DO loop's first instruction; -1 if no loop is active."""
     do_end: int = -1
@@ -100,9 +103,9 @@ def wiring_hash(layout: MachineLayout) -> bytes:
 def translation_hash(context: Context, layout: MachineLayout, wiring: bytes) -> bytes:
     """Return the hash of processor modes and layout. `wiring` is the layout's `wiring_hash`.
 
-    Hooks and filters are excluded, because a region's key contains those inside the region.
+    Hooks, filters and recordings are excluded, because a region's key contains those inside the region.
     """
-    facts = vars(layout) | {"hooks": None, "filters": None, "offset": None, "rules": wiring}
+    facts = vars(layout) | {"hooks": None, "filters": None, "recorded": None, "offset": None, "rules": wiring}
     parts = [sorted(part.items()) if isinstance(part, Mapping) else part for part in facts.values()]
     return hashlib.sha256(repr((context, parts)).encode()).digest()
 
@@ -122,6 +125,7 @@ def machine_layout(
     hooks: frozenset[int],
     offset: Mapping[str, int],
     filters: Mapping[int, tuple[Filter, ...]] | None = None,
+    recorded: Mapping[int, Recording] | None = None,
 ) -> MachineLayout:
     """Return the facts that translations in the modes `key` may rely on."""
     chip, bus, signals = core.chip, core.bus, core.sequencer.power.signals
@@ -148,6 +152,7 @@ def machine_layout(
         tapped=tuple(2 * word for word in sorted(bus.watched)),
         hooks=hooks,
         filters=filters or {},
+        recorded=recorded or {},
         do_start=start,
         do_end=end,
     )

@@ -32,6 +32,7 @@ from emu.dspic30f.jit.ir.rule_emitter import AccessEmitter, LlvmRulePaths
 from emu.dspic30f.jit.ir.values import Emitter, Number, Value, truth, wide
 from emu.dspic30f.jit.ir.variables import pointer
 from emu.dspic30f.jit.machine_layout import MachineLayout
+from emu.dspic30f.jit.translate.arrivals import ArrivalRecorder
 from emu.dspic30f.jit.translate.filters import some_filter_holds
 from emu.dspic30f.jit.translate.frame import FunctionFrame
 from emu.dspic30f.jit.translate.polling import empty_loops
@@ -64,6 +65,7 @@ class Translator(FunctionFrame):
         self.b.dsp_region = any("OA" in step.insn.row.flags for step in region.steps.values())
         self._psv: Final = bool(context.psv)
         self._repeats: Final = RepeatTranslator(self)
+        self._arrivals: Final = ArrivalRecorder(self)
         self._early_exception: Value | None = None
         """Whether an interrupt may be accepted before the third cycle of the return being translated."""
         self._polling: Final = {} if exact else empty_loops(region, layout, context)
@@ -173,7 +175,8 @@ class Translator(FunctionFrame):
         late = self.exit(start, BOUNDARY_WORK if self.exact else DEADLINE)
         e.end(f"br i1 {fits.text}, label %{go}, label %{late}, !prof !0")
         e.start(go)
-        if start in self.layout.hooks:
+        is_recorded = self._arrivals.prepare(items[0].step)
+        if start in self.layout.hooks and not is_recorded:
             self._stop_for_hook(start)
         if self.exact:
             self.counter.begin_instruction(start)
@@ -264,6 +267,7 @@ class Translator(FunctionFrame):
         self._prepare_flow(step, flow)
         self._check_events(step, stall)
         self.b.commit()
+        self._arrivals.record()
         cycles: Number = step.insn.row.cycles + stall + self.b.waited()
         if self.exact and isinstance(flow, Return):  # an event up to the second cycle may end the return there
             due = self.e.let(f"icmp uge i64 {wide(start + cycles - 2)}, %before", bit=True)

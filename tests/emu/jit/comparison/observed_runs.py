@@ -29,6 +29,7 @@ from emu.instruments.trace import Tracer
 from emu.instruments.vcd import WaveformRecorder
 from emu.machine.machine import Machine
 from emu.machine.stops import Stop
+from emu.system.arrivals import ArrivalLog, LoggedNumber
 from emu.system.filters import OPERATORS, Comparison
 from tests.emu.jit.comparison.engine_pair import NO_WATCHDOG, Difference, QuickCompiler
 from tests.emu.jit.comparison.random_firmware import BODY_WORDS, CODE, load, random_firmware
@@ -145,9 +146,11 @@ class Observed:
 
 def _run(
     seed: int, engine: str, chip: Chip, is_observed: bool
-) -> tuple[Machine, bytes, list[tuple[int, int]], list[str]]:
-    """Run the program of a seed. Return the machine, its snapshot, the bytes it sent with their cycles, and the
-    observers."""
+) -> tuple[Machine, bytes, list[tuple[int, int]], list[str], list[list[int]]]:
+    """Run the program of a seed.
+
+    Return the machine, its snapshot, the bytes it sent with their cycles, the observers, and recorded arrivals.
+    """
     firmware, generator = random_firmware(seed, chip), random.Random(f"{seed} {engine}")
     machine = Machine(chip, engine=engine.partition(",")[0], ipl_slip=seed & 1)
     machine.stop_on_fault = False
@@ -165,26 +168,32 @@ def _run(
     for uart in machine.uart.values():
         uart.listen(lambda byte, cycle: sent.append((cycle, byte)), lazy=True)
     names: list[str] = []
+    arrivals = ArrivalLog(machine.record, 3, (LoggedNumber(2, 4), LoggedNumber(0x8F0, 2)), is_logged=True)
     with ExitStack() as stack:
         advance = machine.advance
         if is_observed:
             observed = Observed(machine, generator, stack)
             advance, names = observed.advance, observed.names
+            for hook in arrivals.hooks[: seed % 4]:
+                machine.hook_pc(inputs.randrange(CODE, CODE + 2 * BODY_WORDS, 2), hook)
         for cycle in (CYCLES // 3, CYCLES):
             while machine.cycle < cycle:
                 before = machine.cycle
                 stop = advance(cycle)
                 if (stop is not None and stop.reason == "halt") or machine.cycle == before:
                     break
-    return machine, machine.snapshot(), sorted(sent), names
+    return machine, machine.snapshot(), sorted(sent), names, arrivals.entries().tolist()
 
 
 def check_observed(seed: int, tally: Counter[str], chip: Chip = DSPIC30F6014A) -> None:
-    """Run the program of a seed without and with observers on every engine. Count them in `tally`. Raises
-    Difference."""
-    plain, state, sent, _ = _run(seed, "plain", chip, is_observed=False)
+    """Run the program of a seed without and with observers on every engine. Count them in `tally`.
+
+    Raises Difference, also if the engines record different arrivals.
+    """
+    plain, state, sent, *_ = _run(seed, "plain", chip, is_observed=False)
+    first: list[list[int]] | None = None
     for engine in ENGINES:
-        machine, found, also, names = _run(seed, engine, chip, is_observed=True)
+        machine, found, also, names, arrivals = _run(seed, engine, chip, is_observed=True)
         tally.update(names)
         where = f"seed {seed}, {engine}, {', '.join(names)}"
         if machine.cycle != plain.cycle or also != sent:
@@ -192,3 +201,6 @@ def check_observed(seed: int, tally: Counter[str], chip: Chip = DSPIC30F6014A) -
         if found != state:
             at = next(n for n, pair in enumerate(zip(found, state, strict=True)) if pair[0] != pair[1])
             raise Difference(f"{where}: {machine.record.field_at(at)}")
+        first = arrivals if first is None else first
+        if arrivals != first:
+            raise Difference(f"{where}: {len(arrivals)} arrivals, {len(first)} on {ENGINES[0]}, or other values")
