@@ -8,6 +8,8 @@
     {'twice': 2648}
     >>> arrivals.all()[0]
     Arrival(cycle=371, place='twice', values=(1, 65436))
+
+Input: a machine, places, and names of numbers. The recording does not change the run.
 """
 
 from __future__ import annotations
