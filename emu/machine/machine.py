@@ -123,8 +123,8 @@ class Machine(StateAccess):
             self.state.at["cpu.mode"],
             self.record.fields["cpu.slept"].index,
         )
-        """Hot state of `run_until`: the 64-bit view of the record, and the indices of cycle, deadline, mode, and of the
-        cycle in which the CPU stopped."""
+        """For the fast path of `run_until`: the 64-bit view of the record, and the indices of cycle, deadline, mode and
+        the cycle in which the CPU stopped."""
         self.memory_observer = observer(self) if observer is not None else None
         self.runner = make_engine(engine, self.core, self._pc_hooks.by_address, self._pc_hooks.filters)
         self.reset("POR")

@@ -71,7 +71,7 @@ STEP_LEVEL, BLOCK_LEVEL, HOT_LEVEL = 0, 1, 3
 WARM_UP: Final = 10_000
 """Cycles after power-on that the first machine of a process interprets, in Tcy.
 
-To import the translator and to load the first code takes longer.
+Importing the translator and loading the first code takes longer than interpreting these cycles.
 """
 
 COLD_CYCLES: Final = 1000
@@ -163,7 +163,7 @@ class JitEngine:
         self._arrivals: ArrivalLog | None = None
         """Log of arrivals to which native code appends."""
         self._count_key: object = None
-        """Value that distinguishes the code of one `start_counting` from that of every other one."""
+        """Value that distinguishes code translated after one call of `start_counting` from all other code."""
         self._state: Final = core.state
         self._u16: Final = core.record.u16
         self._words: Final = core.chip.program["flash"].end // 2

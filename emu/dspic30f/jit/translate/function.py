@@ -233,7 +233,7 @@ class Translator(FunctionFrame):
         e.start(ready)
 
     def _stop_for_hook(self, pc: int) -> None:
-        """Leave native code before the hooked address `pc`, unless its hook was just called or none filter holds."""
+        """Leave native code before the hooked address `pc`, unless its hook was just called or no filter holds."""
         e, filters = self.e, self.layout.filters.get(pc)
         if filters is not None:
             calls, passes = e.fresh("calls"), e.fresh("passes")
