@@ -21,7 +21,7 @@ CM_PER_STEP: Final = 0.0128
 WHEEL_SPEED: Final = 12.8
 """Greatest wheel speed, cm/s (epuck.md §3)."""
 THRUST: Final = 1.0
-"""Most force of both wheels, N: 0.7 m g = 1.04, in ARGoS 1.5 (epuck.md §3); experiment-contract.md §3 takes 1.0."""
+"""Largest force of both wheels, N: 0.7 m g = 1.04, in ARGoS 1.5 (epuck.md §3); experiment-contract.md §3 takes 1.0."""
 BRAKE: Final = 1.04
 """Force in N that pushes a robot whose wheels are at rest: its tyres must slip, 0.7 m g (epuck.md §3).
 

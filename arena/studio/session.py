@@ -263,7 +263,7 @@ class TrialSession:
         return Trial(Path("studio"), columns, self._metadata | {"faults": faults})
 
     def inspect(self, robot: int) -> dict[str, Any]:
-        """Return registers, call stack and threads of a robot; for a Kilobot lines of text, for a script a mark."""
+        """Return registers, call stack and threads of a robot; lines of text of a Kilobot; a flag for a script."""
         controller = self._controller(robot)
         if isinstance(controller, KilobotController):
             return {"robot": robot, "lines": controller.inspection()}
