@@ -111,14 +111,15 @@ def _select(report: CoverageReport, image: Image, counts: Counts, options: argpa
     Raises CommandError if no file matches --only.
     """
     has_kernel = any(owner_of_module(name) != APPLICATION for name in report.files)
-    has_own = any(owner_of_module(name) == APPLICATION for name in report.files)
+    own = sorted(name for name in report.files if owner_of_module(name) == APPLICATION)
     for name in list(report.files):
-        is_foreign = has_kernel and has_own and not options.kernel and owner_of_module(name) != APPLICATION
+        is_foreign = has_kernel and own and not options.kernel and owner_of_module(name) != APPLICATION
         if (is_foreign and not options.only) or (options.only and not _matches(name, options.only)):
             del report.files[name]
     if options.only and not report.files:
-        raise CommandError(f"--only {options.only[0]}: no source file of {image.path} matches")
-    if not options.only and (options.kernel or not (has_kernel and has_own)):
+        some = f"; its own files: {', '.join(own[:3])}" + ", ..." * (len(own) > 3) if own else ""
+        raise CommandError(f"--only {options.only[0]}: no source file of {image.path} matches{some}")
+    if not options.only and (options.kernel or not (has_kernel and own)):
         return report.instructions_run, report.instructions
     addresses: set[int] = set()
     for row in image.lines.rows:

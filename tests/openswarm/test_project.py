@@ -17,6 +17,7 @@ from emu.host import installation, paths
 from openswarm.cli import main
 from tests.openswarm.conftest import shortened
 from tests.watchdog import HANG
+from toolchain.frontend.options import CcOptions
 
 ROOT = Path(__file__).resolve().parents[2]
 BIN = Path(sys.executable).parent
@@ -58,6 +59,26 @@ def test_its_baselines_pass_until_a_number_grows(tmp_path, baselines):
     done = run_command(project, "make", "check-cycles")
     assert done.returncode == 2
     assert "cycles.json: schema: expected" in done.stderr
+
+
+def test_below_a_checkout_the_sources_are_named_from_the_project_on(tmp_path):
+    project = new(tmp_path / "robot", "--no-baselines")
+    # as if the project lay in a checkout
+    words = ("FIRMWARE=" + str(tmp_path / "firmware"), "--eval", "recorded: ; @echo $(RECORDED)")
+    done = run_command(project, "make", "--no-print-directory", *words, "recorded")
+    maps = CcOptions(clang=done.stdout.split()).prefix_map
+    source = str(project / "src" / "main.c")
+    old, name = [pair for pair in maps if source.startswith(pair[0])][-1]
+    assert (len(maps), name + source.removeprefix(old)) == (2, "src/main.c")
+
+
+def test_without_pytest_make_test_says_how_to_install_it(tmp_path):
+    project = new(tmp_path / "robot", "--no-baselines")
+    bare = tmp_path / "python"
+    bare.write_text(f'#!/bin/sh\nexec {sys.executable} -I -S "$@"\n')  # without installed packages
+    bare.chmod(0o755)
+    done = run_command(project, "make", "test", f"PYTHON={bare}", "HEX=")
+    assert (done.returncode, done.stderr.splitlines()[0]) == (2, "make test needs pytest: pip install pytest")
 
 
 def test_without_make_the_baselines_are_missing_with_a_reason(tmp_path, monkeypatch, capsys):

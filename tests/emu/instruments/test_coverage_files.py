@@ -68,7 +68,9 @@ def test_files_are_selected_by_folder_or_pattern(image, capsys):
         assert facts["lines"]["all"] == sum(one["lines"]["all"] for one in facts["files"].values())
         assert 0 < facts["instructions"]["run"] <= facts["instructions"]["all"] < 40
     assert main([*words, "--only", "nothing/"]) == 2
-    assert "--only nothing/: no source file of" in capsys.readouterr().err
+    said = capsys.readouterr().err
+    assert "--only nothing/: no source file of" in said
+    assert said.endswith(" matches; its own files: src/main.c, src/own.c\n")
 
 
 def test_pages_show_lines_with_counts(image, tmp_path, capsys):
