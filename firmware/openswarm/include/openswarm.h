@@ -7,11 +7,16 @@
  * Each function below carries one contract line:
  *     callers | blocks? | worst-case Tcy on the dsPIC30F | stack bytes | error codes (Sys_Get_LastError)
  * Callers: M = main before Sys_Start_Kernel, T = thread, H = event handler or condition, I = ISR of priority 4. n
- * threads, m events, b newer events in the same bucket (identifier modulo 8), s subscriptions of one event, q queued
- * messages, d payload bytes; g cycles free a block of memory: 60-150, at most 1,200 in a fragmented heap. Cycles were
- * measured on firmware/apps and tests/firmware/target; those with a ~ are counted by hand. Stack is that of `python -m
- * toolchain bounds` with the return address; a switch adds its frame (port/dspic30f/README.md). Calls that may block
- * or yield are refused before Sys_Start_Kernel. A call from a context that is not listed is refused: it returns
+ * threads, w other threads that wait, e other threads whose time-out has expired and that do not run yet, m events,
+ * b newer events in the same bucket (identifier modulo 8), s subscriptions of one event, q queued messages, d payload
+ * bytes; g cycles free a block of memory: 60-150, at most 1,200 in a fragmented heap.
+ *
+ * Cycles count from the first instruction of a call to the instruction behind the call, without interrupts. Those of a
+ * call that blocks are the caller's own, under round robin: from the call until the next thread is resumed, and from
+ * the moment the caller is resumed to its return. The wait does not count, nor do the handlers, conditions and wake-ups
+ * of the switch. Tests compare every number with `python -m toolchain bounds` or with runs on the emulator. Stack is
+ * that of `toolchain bounds` with the return address; a switch adds its frame (port/dspic30f/README.md). Calls that may
+ * block or yield are refused before Sys_Start_Kernel. A call from a context that is not listed is refused: it returns
  * failure, sets SYS_ERROR_CONTEXT and increments sys_statistics.refused.
  */
 #ifndef OPENSWARM_H
@@ -114,25 +119,27 @@ typedef struct {
 uint16 Sys_Start_Process(sys_function f);
 /* MTH | no | as above | 34 | MEMORY, ARGUMENT.  The same with a configuration. */
 uint16 Sys_Start_ProcessWith(const sys_process_config *config);
-/* MTH | own PID: never returns | ~450 + 25 m + g per subscription of its own | 54 | PROCESS.  Ends a thread with its
+/* MTH | own PID: never returns | 450 + 25 m + g per subscription of its own | 54 | PROCESS.  Ends a thread with its
  * subscriptions, its wait and its uncleared wait result. */
 bool Sys_Kill_Process(uint16 pid);
-/* T | no | 54 to a yielded thread, 66 to a preempted one | 4 | CONTEXT.  Ends the caller's slice. */
+/* T | no | 54 to a yielded thread, 65 to a preempted one, with the call instruction | 4 | CONTEXT.  Ends the caller's
+ * slice. */
 void Sys_Yield(void);
-/* T | yes, ms rounded up to the next 1 ms tick | ~200 + 20 n | 36 | CONTEXT.  0 ms = Sys_Yield. */
+/* T | yes, ms rounded up to the next 1 ms tick | 231 + 46 w + (88 + 7 w) e | 36 | CONTEXT.  0 ms = Sys_Yield. */
 void Sys_Sleep(uint16 ms);
-/* T with SYS_PERIODIC | until its next release | ~240 + 20 n | 60 | CONTEXT, PROCESS.  True: the deadline was met. */
+/* T with SYS_PERIODIC | until its next release | 267 + 46 w + (88 + 7 w) e; after a missed deadline 56 and those of
+ * Sys_Send_IntEvent more | 60 | CONTEXT, PROCESS.  True: the deadline was met. */
 bool Sys_Wait_for_Period(void);
-/* MTHI | no | 20 | 4 | none.  Nests. Until the matching End, no thread switch occurs and no handler runs; the End
- * takes a slice end that is due. Interrupts stay enabled. An open section ends with its thread, or with the handlers. In an ISR
- * neither call has an effect. */
+/* MTHI | no | 18, the end 15 | 4 | none.  Nests. Until the matching End, no thread switch occurs and no handler runs;
+ * the End takes a slice end that is due. Interrupts stay enabled. An open section ends with its thread, or with the
+ * handlers. In an ISR neither call has an effect. */
 void Sys_Start_CriticalSection(void);
 void Sys_End_CriticalSection(void);
 /* MTHI | no | 6 | 4 | none.  The running thread. In a handler that is the interrupted thread: use the pid argument. */
 uint16 Sys_Get_ProcessID(void);
-/* MTH | no | ~90 + 25 n | 16 | none.  SYS_UNKNOWN: no such thread. */
+/* MTH | no | 90 + 25 n | 16 | none.  SYS_UNKNOWN: no such thread. */
 sys_state Sys_Get_ProcessState(uint16 pid);
-/* MTH | no | ~110 + 22 n + 10 per byte | 16 | none.  Stack bytes never used so far; 0 also for an unknown PID and
+/* MTH | no | 110 + 22 n + 10 per byte | 16 | none.  Stack bytes never used so far; 0 also for an unknown PID and
  * PID 0. */
 uint16 Sys_Get_UnusedStack(uint16 pid);
 /* MTHI | no | 20 + 8 per byte | 4 | none.  The same for the kernel stack (handlers, ISRs and scheduler). */
@@ -160,20 +167,20 @@ bool Sys_Set_Scheduler(const sys_scheduler *scheduler);
 
 /* MTH | no | 146 + 9 b; at most 600 more while memory is short | 28 | MEMORY.  True also if already registered. */
 bool Sys_Register_Event(uint16 event);
-/* MTH | no | ~230 + 9 b + (15 + g) s + 20 n + 10 q + g | 40 | EVENT.  Ends the event's subscriptions, drops its queued
+/* MTH | no | 230 + 9 b + (15 + g) s + 20 n + 10 q + g | 40 | EVENT.  Ends the event's subscriptions, drops its queued
  * messages and wakes its waiters with NULL. */
 bool Sys_Unregister_Event(uint16 event);
-/* MTHI | no | ~40 + 9 b | 14 | none. */
+/* MTHI | no | 40 + 9 b | 14 | none. */
 bool Sys_IsEventRegistered(uint16 event);
-/* MTH | no | ~140 + 9 b + 11 s + 18 n; at most 650 more while memory is short | 46 | EVENT, PROCESS, MEMORY, ARGUMENT.
+/* MTH | no | 140 + 9 b + 11 s + 18 n; at most 650 more while memory is short | 46 | EVENT, PROCESS, MEMORY, ARGUMENT.
  * Once per (event, pid, handler): subscribing again replaces the condition. condition NULL = always. Handlers run in
  * order of subscription. A handler subscribed during a delivery gets the next message first, before the handlers that
  * the current one has not reached. */
 bool Sys_Subscribe_to_Event(uint16 event, uint16 pid, sys_handler handler, sys_condition condition);
-/* MTH | no | ~120 + 9 b + (15 + g) s | 48 | EVENT, PROCESS: it had none.  Unsubscribes all handlers of a thread. PID 0
+/* MTH | no | 120 + 9 b + (15 + g) s | 48 | EVENT, PROCESS: it had none.  Unsubscribes all handlers of a thread. PID 0
  * is the system thread only: the drivers' handlers belong to no thread. */
 bool Sys_Unsubscribe_from_Event(uint16 event, uint16 pid);
-/* MTH | no | ~120 + 9 b + (15 + g) s | 44 | EVENT, PROCESS: it was not subscribed.  Unsubscribes one handler. */
+/* MTH | no | 120 + 9 b + (15 + g) s | 44 | EVENT, PROCESS: it was not subscribed.  Unsubscribes one handler. */
 bool Sys_Unsubscribe_Handler(uint16 event, uint16 pid, sys_handler handler);
 /* MTHI | no | 95, or 124 + 10 b; 17 + d/2 more unless d = 2; 8 per waiting thread if there is no handler; 70 without
  * listeners; at most 460 more while memory is short | 30 | EVENT, MEMORY, ARGUMENT.  Copies the payload into a
@@ -183,16 +190,17 @@ bool Sys_Unsubscribe_Handler(uint16 event, uint16 pid, sys_handler handler);
 bool Sys_Send_Event(uint16 event, const void *data, uint16 size);
 /* MTHI | no | 104, or 133 + 10 b | 36 | EVENT, MEMORY.  As above. */
 bool Sys_Send_IntEvent(uint16 event, uint16 value);
-/* T | yes | ~250 + 9 b + 30 n | 42 | CONTEXT, EVENT.  NULL: refused, or the event was unregistered. A thread owns one
- * wait result at a time: its next wait, except sleep, frees the previous one. */
+/* T | yes | 229 + 9 b + 7 (w + e); 17 + 22 n + g more if it frees a result | 42 | CONTEXT, EVENT.  NULL: refused, or
+ * the event was unregistered. A thread owns one wait result at a time; its next wait, except sleep, frees it. */
 sys_event_data *Sys_Wait_for_Event(uint16 event);
 sys_event_data *Sys_Wait_for_Condition(uint16 event, sys_condition condition);
-/* T | yes | as above | 48 | CONTEXT, EVENT.  NULL with SYS_OK also after ms milliseconds. ms 0 = no time-out. */
+/* T | yes | as above; with a time-out 53 + 39 w + (81 + 7 w) e more | 48 | CONTEXT, EVENT.  NULL with SYS_OK also after
+ * ms milliseconds. ms 0 = no time-out. */
 sys_event_data *Sys_Wait_for_ConditionTimeout(uint16 event, sys_condition condition, uint16 ms);
-/* T | no | ~70 + 25 n + g | 36 | none.  Frees a wait result and sets *data = NULL. NULL-safe; in a handler or an ISR
+/* T | no | 88 + 22 n + g | 36 | none.  Frees a wait result and sets *data = NULL. NULL-safe; in a handler or an ISR
  * it only sets NULL. */
 void Sys_Clear_EventData(sys_event_data **data);
-/* MTHI | no | ~50 | 4 | none.  Messages of this event lost for lack of memory since the start; saturates at 65535. */
+/* MTHI | no | 40 | 4 | none.  Messages of this event lost for lack of memory since the start; saturates at 65535. */
 uint16 Sys_Get_LostEvents(uint16 event);
 
 /* ---- Information -------------------------------------------------------------------------------------------- */
@@ -206,15 +214,15 @@ typedef struct {
     uint16 overflows;   /* threads dropped after a stack overflow (SYS_ON_OVERFLOW) */
 } sys_statistics;
 
-/* MTHI | no | ~20 | 8 | none. */
+/* MTHI | no | 14 | 8 | none. */
 const sys_statistics *Sys_Get_Statistics(void);
-/* MTHI | no | 12 | 4 | none.  Milliseconds since Sys_Start_Kernel, without drift; wraps after 49.7 days. */
+/* MTHI | no | 9 | 4 | none.  Milliseconds since Sys_Start_Kernel, without drift; wraps after 49.7 days. */
 uint32 Sys_Get_SystemTime(void);
 /* MTHI | no | 18 | 8 | none.  The caller's sys_error: each thread has one; all handlers and conditions share one;
  * all ISRs share one. It stays until the next failing call; sends and restarts of the kernel itself do not change it.
  * In a thread, blocking may set it to SYS_OK. */
 uint16 Sys_Get_LastError(void);
-/* MTHI | no | 6 | 4 | none.  The current speed, mm/s, after the post-processor. */
+/* MTHI | no | 4 | 4 | none.  The current speed, mm/s, after the post-processor. */
 sint16 Sys_Get_MotorSpeed_Left(void);
 sint16 Sys_Get_MotorSpeed_Right(void);
 

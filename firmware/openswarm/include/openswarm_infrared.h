@@ -62,17 +62,20 @@ typedef struct {
 
 /* Receives each arrived message and may change it; false: no event. ISR context. The default accepts every message. */
 typedef bool (*sys_message_processor)(sys_neighbour_message *message);
-sys_message_processor Sys_Set_MessageProcessor(sys_message_processor processor); /* MTHI */
+/* MTHI | no | 6 | 4 | none. */
+sys_message_processor Sys_Set_MessageProcessor(sys_message_processor processor);
 
 /* Receives each message before it is queued and may change up to SYS_MESSAGE_BYTES bytes and their number; false:
  * refused. Context of the sender. The default accepts every message. */
 typedef bool (*sys_sending_processor)(uint8 *payload, uint8 *size);
-sys_sending_processor Sys_Set_SendingProcessor(sys_sending_processor processor); /* MTHI */
+/* MTHI | no | 6 | 4 | none. */
+sys_sending_processor Sys_Set_SendingProcessor(sys_sending_processor processor);
 
 /* Receives each message one scan (244 us) before its first bit is sent, however long it waited. It may change the
  * bytes, not their number, for example to add the time of sending. ISR context. The default changes nothing. */
 typedef void (*sys_leaving_processor)(uint8 *payload, uint8 size);
-sys_leaving_processor Sys_Set_LeavingProcessor(sys_leaving_processor processor); /* MTHI */
+/* MTHI | no | 6 | 4 | none. */
+sys_leaving_processor Sys_Set_LeavingProcessor(sys_leaving_processor processor);
 
 /* M | no | - | 38 | MEMORY.  Between Sys_Init_Kernel and Sys_Start_Kernel. */
 bool Sys_Start_Infrared(void);
@@ -110,7 +113,8 @@ typedef struct {
     uint16 refused;     /* messages refused because the queue was full */
     uint16 conflicts;   /* frames of another robot with this robot's number */
 } sys_infrared_statistics; /* counters saturate */
-const sys_infrared_statistics *Sys_Get_InfraredStatistics(void); /* MTHI */
+/* MTHI | no | 4 | 4 | none. */
+const sys_infrared_statistics *Sys_Get_InfraredStatistics(void);
 
 #ifdef __cplusplus
 }

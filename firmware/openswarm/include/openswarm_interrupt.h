@@ -46,13 +46,13 @@ extern "C" {
     }                                                                                                                 \
     HAL_INTERRUPT_ENTRY(vector, level, sys_isr_##vector)
 
-/* MTHI | no | 10 | 4 | none.  Sets the level, clears the flag and enables the interrupt. From any file. */
+/* MTHI | no | 13 | 4 | none.  Sets the level, clears the flag and enables the interrupt. From any file. */
 #define Sys_Enable_Interrupt(vector)                                                                                  \
     do {                                                                                                              \
         extern void sys_enable_##vector(void);                                                                        \
         sys_enable_##vector();                                                                                        \
     } while (0)
-/* Any context | no | 2 | 0 | none.  An interrupt raised at this instant may still be taken; the next Enable discards
+/* Any context | no | 1 | 0 | none.  An interrupt raised at this instant may still be taken; the next Enable discards
  * one raised later. */
 #define Sys_Disable_Interrupt(vector) HAL_INTERRUPT_DISABLE(vector)
 /* Any context, also levels 5 and 6 | no | 1 | 0 | none.  It is taken once as soon as its level allows, however often

@@ -30,8 +30,10 @@ typedef struct {
 typedef bool (*sys_motor_processor)(uint16 event, const sys_event_data *data, sys_wheel_speeds *speeds);
 
 bool Sys_Default_MotorProcessor(uint16 event, const sys_event_data *data, sys_wheel_speeds *speeds);
-sys_motor_processor Sys_Set_MotorProcessor(sys_motor_processor processor); /* MTH */
-/* MTH | no | as Sys_Subscribe_to_Event.  Routes another (virtual actuator) event to the post-processor. */
+/* MTH | no | 55 | 16 | none. */
+sys_motor_processor Sys_Set_MotorProcessor(sys_motor_processor processor);
+/* MTH | no | as Sys_Subscribe_to_Event | 46 | EVENT, MEMORY.  Routes another (virtual actuator) event to the
+ * post-processor. */
 bool Sys_Connect_Motors(uint16 event);
 
 /* ---- UARTs: SYS_SEND_UARTn, SYS_UARTn_RECEIVED, SYS_UARTn_READY ------------------------------------------------ */
@@ -53,11 +55,14 @@ uint16 Sys_Chunk_Rx(uint8 byte, uint8 *buffer, uint16 *used);
 bool Sys_Frame_Tx(const uint8 *message, uint16 size, sys_put put);      /* COBS + CRC-16/CCITT-FALSE, 0 ends a frame */
 uint16 Sys_Frame_Rx(uint8 byte, uint8 *buffer, uint16 *used);           /* damaged frames are dropped */
 
-sys_tx_processor Sys_Set_TxProcessor(uint8 uart, sys_tx_processor processor); /* MTH */
-/* MTHI.  Bytes received by the previous processor are sent first, as one chunk. */
+/* MTH | no | 62 | 16 | none. */
+sys_tx_processor Sys_Set_TxProcessor(uint8 uart, sys_tx_processor processor);
+/* MTHI | no | 85; 35 and those of Sys_Send_Event more if bytes were received | 64 | none.  Bytes received by the
+ * previous processor are sent first, as one chunk. */
 sys_rx_processor Sys_Set_RxProcessor(uint8 uart, sys_rx_processor processor);
 
-/* MTH | no | 60 + 30 per byte | 44 | BUSY, ARGUMENT.  Queues one message, whole or not at all. It is copied into
+/* MTH | no | 170 + 34 per byte + 75 per block; at most 460 more per block while memory is short, and g per block of a
+ * killed writer's message | 56 | BUSY, ARGUMENT.  Queues one message, whole or not at all. It is copied into
  * blocks of the heap, which are freed one by one as they are sent: each has E + 1 bytes and up to SYS_SMALL_PAYLOAD
  * - 1 of the message. BUSY: SYS_UART_TX or the heap is exhausted; SYS_UARTn_READY follows once the queue is empty.
  * ARGUMENT: the message alone needs more than SYS_UART_TX, or the Tx-processor refused it. */
@@ -69,12 +74,13 @@ typedef struct {
     uint16 rx_lost;    /* messages lost for lack of memory, and overrun bytes */
     uint16 rx_damaged; /* frames with a wrong length or checksum */
 } sys_uart_statistics;
-const sys_uart_statistics *Sys_Get_UARTStatistics(uint8 uart); /* MTHI */
+/* MTHI | no | 9 | 4 | none. */
+const sys_uart_statistics *Sys_Get_UARTStatistics(uint8 uart);
 
 /* ---- LEDs ------------------------------------------------------------------------------------------------------ */
 
 enum { SYS_LED_RING = 8, SYS_LED_BODY = 8, SYS_LED_FRONT = 9, SYS_LEDS = 10 };
-/* MTHI | no | 30 | 8 | ARGUMENT.  led 0-7 clockwise from the front, SYS_LED_BODY, SYS_LED_FRONT. */
+/* MTHI | no | 41, toggling 56 | 18 | ARGUMENT.  led 0-7 clockwise from the front, SYS_LED_BODY, SYS_LED_FRONT. */
 bool Sys_Set_LED(uint8 led, bool on);
 bool Sys_Toggle_LED(uint8 led);
 
@@ -82,8 +88,10 @@ bool Sys_Toggle_LED(uint8 led);
 
 /* Receives a debounced position before it is sent as an event, and may change it; false: no event. ISR context. */
 typedef bool (*sys_selector_processor)(uint8 *position);
-sys_selector_processor Sys_Set_SelectorProcessor(sys_selector_processor processor); /* MTHI */
-uint8 Sys_Get_Selector(void); /* MTHI.  0-15, debounced */
+/* MTHI | no | 9 | 4 | none. */
+sys_selector_processor Sys_Set_SelectorProcessor(sys_selector_processor processor);
+/* MTHI | no | 4 | 4 | none.  0-15, debounced. */
+uint8 Sys_Get_Selector(void);
 
 #ifdef __cplusplus
 }

@@ -21,7 +21,7 @@ struct sys_scheduler {
                  * running thread, which keeps the rest of its slice if it is not picked */
 };
 
-/* H | no | 4 | 4 | none.  Only while a sys_pick runs. */
+/* H | no | 5 | 4 | none.  Only while a sys_pick runs. */
 sys_pcb *Sys_Next_Ready(const sys_pcb *process);
 uint16 Sys_Pid_Of(const sys_pcb *process);
 uint8 Sys_Priority_Of(const sys_pcb *process);

@@ -16,7 +16,9 @@ int main(void)
     result = Sys_Get_RobotNumber();
     SYS_ASSERT(Sys_Set_RobotNumber(result + 1u) && Sys_Set_InfraredThreshold(5));
     result = Sys_Estimate_Range(result);
-    SYS_ASSERT(Sys_Get_InfraredStatistics()->sent == 0);
+    SYS_ASSERT(Sys_Get_InfraredStatistics()->sent == 0 && Sys_Get_RemoteStatistics()->shared == 0);
+    SYS_ASSERT(Sys_Set_MessageProcessor(NULL) != NULL && Sys_Set_SendingProcessor(NULL) != NULL);
+    SYS_ASSERT(Sys_Set_LeavingProcessor(NULL) != NULL);
     Sys_Start_Kernel();
     Sys_Run_SystemThread();
     return 0;
