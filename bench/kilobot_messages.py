@@ -43,7 +43,7 @@ Counts = tuple[float, dict[int, float]]
 
 
 def measure(image: AvrImage, seed: int, seconds: float) -> Counts:
-    """Return the messages sent as a share of one every 16 ticks, and the share received by distance in mm."""
+    """Return two shares: sent, of the maximum of one message every 16 ticks; and received, by distance in mm."""
     dice = np.random.default_rng(seed)
     robots = [KilobotSetup(image, GAP_MM * (n % SIDE), GAP_MM * (n // SIDE), n, float(2 * dice.random()),
                            clock=float(1 + CLOCK_SD * np.clip(dice.normal(), -3, 3)))

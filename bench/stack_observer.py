@@ -305,7 +305,7 @@ class Observer:
                 self._nest(deeper, nested | {handler})
 
     def _follow(self, since: _State, handler: int, most: int) -> list[_Moment]:
-        """Run a requested handler to its end, and return its deepest moments: one for each stack and priority."""
+        """Run a requested handler to its end, and return its moments of greatest stack use (`_worst`)."""
         self._since, kept, self._deepest = since, self._deepest, {}
         entered = None
         for number in range(most):

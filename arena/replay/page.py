@@ -146,10 +146,10 @@ def sample_data(trial: Trial) -> dict[str, Any]:
 
 
 def _camera_views(trial: Trial) -> list[tuple[list[int], list[bytes]]]:
-    """Return per robot the readings of its line-of-sight sensor and its camera strips, as recorded without a camera.
+    """Return per robot the readings of its line-of-sight sensor and its camera strips.
 
-    If the firmware does not report its sensor, the reading is computed from the poses. A scripted robot has no camera;
-    its strip is rendered in noise-free colours."""
+    Values are those of the record. For a robot with a camera, values that the record lacks are computed from the poses:
+    readings that the firmware did not report, and the strip of a scripted robot, in noise-free colours."""
     scene = trial.scene
     colours = colours_of(scene)
     seed = trial.about["seed"]

@@ -90,7 +90,7 @@ def options_of(command: str, said: str) -> str:
 
 
 def _block(text: str) -> str:
-    """Return a part of a help text in Markdown: a title of options in bold, any other text as a block of code."""
+    """Return a part of a help text in Markdown: the title of an option group in bold, other text as a code block."""
     text = re.sub(r"\n*^options:$", "", text.strip("\n"), flags=re.MULTILINE)
     title = re.fullmatch(r"(\w[\w ]*):", text)
     return f"**{title[1]}**\n" if title else f"```text\n{text}\n```\n" if text else ""

@@ -221,7 +221,8 @@ class Atmega328p:
         """Write bytes of data memory, without the effects of a write. Raises KeyError."""
         address = self._resolved(place)
         self.state.data[address : address + len(octets)] = list(octets)
-        self.state.tracing = self.state.round = self.state.resting = self.state.counts_until = 0  # the loop may end
+        # Discard the repetition that the interpreter found in a wait loop: the written data may end the loop.
+        self.state.tracing = self.state.round = self.state.resting = self.state.counts_until = 0
 
     def write_eeprom(self, address: int, octets: bytes) -> None:
         """Write bytes of the EEPROM. Raises ValueError if they are not within its 1,024 bytes."""

@@ -28,8 +28,8 @@ class Native(Structure):
             "begins",  # uint64: whether a call begins with the boundary before the instruction at PC
             "limit", "last",  # uint64: cycles at which native code returns (`Engine.pass_limits`)
               "noted", "notes",  # uint64: number and cycles of the passed limits (`Engine.passed`)
-            "fresh",  # uint64 [FRESH_ROOM]: instructions that read a register that a device refreshes, then 0:
-                      # PC + (index of the register << 32)
+            "fresh",  # uint64 [FRESH_ROOM], terminated by 0: instructions that read a register that a device
+                      # refreshes, each as PC + (index of the register << 32)
             "cycle", "now", "deadline",  # uint64: cycle of the CPU, of the devices, of the earliest event
             "pc",  # uint32
             "mode", "corcon", "ie0", "ie1", "ie2",  # uint16: mode of the CPU, and SFRs

@@ -90,7 +90,8 @@ class IrCache:
         folders = sorted({os.path.dirname(path) or "." for path in read} | _header_folders(job))
         maps = [old for _, old, _ in _prefix_maps(job) if old not in folders and old.startswith((".", *folders))]
         named = [*headers, *(f"./{path}" for path in headers)]
-        if any(path.startswith(old) for path in named for old in maps):  # the key lacks a header's new name
+        # A prefix map renames a header, and the key does not contain the new name.
+        if any(path.startswith(old) for path in named for old in maps):
             return
         names = {path[len(folder) + 1 :] for folder in folders for path in headers if path.startswith(f"{folder}/")}
         names |= {os.path.basename(path) for path in headers}

@@ -151,7 +151,7 @@ def can(chip: Chip) -> Iterator[str]:
 
 
 def _buffer_functions(n: str) -> Iterator[str]:
-    """Functions of module `n` whose argument selects a buffer, filter or mask; other numbers select the last one."""
+    """Functions of module `n` that select a buffer, filter or mask by number. Numbers out of range select the last."""
 
     def chosen(argument: str, count: int, place: str) -> str:
         """Expression of the address of one of `count` registers; `#` in `place` is the number."""

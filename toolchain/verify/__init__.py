@@ -5,11 +5,11 @@ the recorded facts, raises MachineError, and records the new facts. The verifier
 (`-fverify-machine`, or DSPIC_VERIFY_MACHINE=1).
 
 rule                                                                                     module
-blocks end in their successors; branches have targets                                    form.py
+the end of a block agrees with its successors; branch targets exist                      form.py
 a skip covers conditional instructions, and every conditional instruction has a skip     form.py
-pairs are even-aligned, word operands no pairs, near bytes move through W0               form.py
+pairs start at even registers; words and pairs do not mix; near bytes move through W0    form.py
 every reader of a flag gets it from the same kind of instruction as before               flags.py
-a pass makes no register undefined at a read; callee-saved registers are saved           registers.py
+no pass leaves a register undefined where it is read; callee-saved registers are saved   registers.py
 every instruction reads the value that it read before allocation                         allocation.py
 pushes and pops balance on every path                                                    stack.py
 volatile accesses, calls and assembly: number, order and width on every path             traces.py

@@ -75,7 +75,7 @@ enum {
     SYS_1ms_TIMER = 0x07,           /* [uint16, low word of the system time] */
     SYS_IO_SELECTOR = 0x08,         /* [uint8 0-15] on change */
     SYS_UART1_RECEIVED = 0x09,      /* [bytes] one chunk or frame */
-    SYS_UART1_READY = 0x0A,         /* [uint16 SYS_UART_TX, all free] after a refusal as BUSY: the queue is empty */
+    SYS_UART1_READY = 0x0A,         /* [uint16 SYS_UART_TX: free bytes] queue empty, after a call failed with BUSY */
     SYS_SEND_UART2 = 0x0B,
     SYS_UART2_RECEIVED = 0x0C,
     SYS_UART2_READY = 0x0D,

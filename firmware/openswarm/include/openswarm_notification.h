@@ -20,8 +20,8 @@ typedef struct sys_notification {
     uint16 awaited;        /* private to the kernel */
 } sys_notification;
 
-/* MTHI | no | 16; 372 until a better thread that waits runs | 4 | none.  Sets bits. The next thread switch wakes the
- * thread that waits for one of them; under an eager scheduler that switch follows at once. */
+/* MTHI | no | 16; 372 until a waiting thread that the scheduler prefers runs | 4 | none.  Sets bits. The next thread
+ * switch wakes the thread that waits for one of them; under an eager scheduler that switch follows at once. */
 void Sys_Notify(sys_notification *notification, uint16 bits);
 /* The same; first replaces the value. */
 void Sys_Notify_Value(sys_notification *notification, uint16 bits, uint16 value);

@@ -19,8 +19,8 @@ typedef struct sys_semaphore {
 
 #define SYS_SEMAPHORE(units) {(units)}
 
-/* MTHI | no | 26; 387 until a better thread that waits runs | 16 | BUSY: 65535 units.  Adds a unit. The next thread
- * switch passes it to a waiting thread; under an eager scheduler that switch follows at once. */
+/* MTHI | no | 26; 387 until a waiting thread that the scheduler prefers runs | 16 | BUSY: 65535 units.  Adds a unit.
+ * The next thread switch passes it to a waiting thread; under an eager scheduler that switch follows at once. */
 bool Sys_Signal_Semaphore(sys_semaphore *semaphore);
 /* T | while there is no unit | 123; 254 to the next thread if it blocks | 38, with a time-out 44 |
  * CONTEXT.  Takes a unit. Frees the caller's uncleared wait result if it blocks. */

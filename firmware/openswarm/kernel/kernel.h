@@ -53,7 +53,7 @@ union message {
 
 /* Cause of a wait, or progress within the slice. */
 typedef union {
-    event *awaited; /* blocked: NULL if the thread waits for time only; an option's object, which is no event */
+    event *awaited; /* blocked: the event, or an option's object cast to event *; NULL: thread waits for time only */
     uint16 spent;   /* ready: part of the slice used before the thread was preempted, in the port's units */
 } event_or_slice;
 

@@ -157,7 +157,7 @@ def test_the_server_answers_its_two_places_only(
 def test_the_command_serves_until_it_is_interrupted(
     tmp_path: Path, recorded: tuple[dict[str, Any], list[dict[str, Any]]]
 ) -> None:
-    """`arena live` prints its address and ends without a message on Ctrl-C."""
+    """`arena replay --live` prints its address and ends without a message on Ctrl-C."""
     about, rows = recorded
     live = LiveFile(live_path(tmp_path, 1), about)
     live.write(rows[0])
@@ -176,7 +176,7 @@ def test_the_command_serves_until_it_is_interrupted(
 
 
 def test_live_needs_a_run_that_goes_on(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """`arena live` for a folder without a running trial ends with exit status 2."""
+    """`arena replay --live` for a folder without a running trial ends with exit status 2."""
     assert main(["replay", str(tmp_path), "--live"]) == 2
     assert "no trial is running here" in capsys.readouterr().err
 

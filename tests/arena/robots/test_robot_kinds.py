@@ -51,7 +51,7 @@ class Point(ControllerWithoutUart):
 def controllers(
     scene: Scene, seed: int, robots: Sequence[int], programs: Sequence[Program], channel: object
 ) -> list[Point]:
-    """Return the controllers of the robots; this function is the engine of the kind."""
+    """Return the controllers of the robots: the engine of the kind `POINT`."""
     assert len(programs) == len(robots)
     return [Point(robot) for robot in robots]
 

@@ -55,7 +55,7 @@ TEST(a_refused_message_has_room_when_ready_is_said, "openswarm_io.h: back-pressu
         accepted++;
     }
     CHECK_EQ(Sys_Get_LastError(), SYS_ERROR_BUSY);
-    CHECK_EQ(accepted, SYS_UART_TX / (sizeof(message) + 1 + sizeof block + 1)); /* rounded to an even size */
+    CHECK_EQ(accepted, SYS_UART_TX / (sizeof(message) + 1 + sizeof block + 1)); /* last 1: even size */
     CHECK_EQ(Sys_Get_UARTStatistics(SYS_UART1)->tx_refused, 1);
     host_tick();
     Sys_Yield();

@@ -46,7 +46,7 @@ class EmulatedKilobot:
         return sent
 
     def watch_stack(self, lowest: int, highest: int) -> None:
-        """Select the stack between two addresses, which the kernel fills with one value."""
+        """Select the stack that `lowest_sp` examines, by its addresses. The kernel has filled it with one value."""
         self._watched = range(lowest, highest + 1)
 
     def lowest_sp(self) -> int:

@@ -127,7 +127,7 @@ int main(void)
 
 
 def test_a_thread_that_ends_after_an_overflow_is_reported(tmp_path: Path) -> None:
-    """The RISC-V detects an overflow at the end of a thread that no switch has checked (port/riscv/README.md).
+    """The RISC-V port detects an overflow when a thread ends before any switch checks it (port/riscv/README.md).
 
     The overflow damages the control block of the next thread.
     """

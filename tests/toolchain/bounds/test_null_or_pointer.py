@@ -61,7 +61,7 @@ def test_a_store_through_a_pointer_that_may_be_null_spares_the_stack_pointer(tmp
 
 
 def holds(where: values.Value, number: int) -> bool:
-    """Whether a set contains a number, by all that it states about its members."""
+    """Whether a number satisfies the set's extremes, its known bits and its least member other than 0."""
     (lo, hi), (mask, bits) = extremes(where), known_bits(where)
     least = where.least if isinstance(where, Interval) else 0
     return lo <= number <= hi and number & mask == bits and (number == 0 or number >= least)

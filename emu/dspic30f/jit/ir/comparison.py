@@ -13,7 +13,7 @@ _COMPARE: Final[dict[str, Callable[[Any, Any], Any]]] = {"==": eq, "!=": ne, "<"
 
 
 def compare(one: Comparison, value: Number) -> Number:
-    """Emit the comparison of a number of `one.size` bytes, of which it may select a field."""
+    """Emit the comparison of `value`, which has `one.size` bytes, or of its bit field `one.field`, with a constant."""
     bits = 8 * one.size
     if one.field is not None:
         bits, lsb = one.field

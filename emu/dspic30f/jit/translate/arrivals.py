@@ -20,7 +20,7 @@ from emu.system.arrivals import COUNTS, LOGGED, ROOM, LoggedNumber, Recording
 
 
 class ArrivalRecorder:
-    """Emits the recording of arrivals in one function."""
+    """Emits IR that records arrivals at the hooked addresses of one function: a count and a log."""
 
     def __init__(self, frame: FunctionFrame) -> None:
         self._f: Final = frame

@@ -20,7 +20,7 @@ enum {
     EVENT_BITS = 13,
     NUMBER_BITS = 11,
     SEQUENCES = 32,
-    WINDOW = 16,    /* sequences recorded behind the newest one */
+    WINDOW = 16,    /* sequence numbers before the newest one that are recorded */
     GATE = 2,       /* number of the gate minus that of its event: no event of that number is in the bucket */
     TIME_SHIFT = 8  /* times of records are in units of 256 ms: 16 bits are four hours */
 };

@@ -49,7 +49,7 @@ bool Sys_Begin_Update(const sys_update *facts);
 bool Sys_Put_UpdateRow(uint8 row, const uint8 *bytes);
 /* Bit n: row n is missing; 0 if no update was begun. */
 uint32 Sys_Get_MissingRows(void);
-/* Stores the program. false, and it is not stored: a row is missing, or the CRC is wrong. */
+/* Makes the update a stored program. false: a row is missing, the CRC or tag is wrong, or flash did not hold row 0. */
 bool Sys_End_Update(void);
 /* Returns the facts of the newest whole program, and whether it is activated. false: there is none. */
 bool Sys_Get_StoredUpdate(sys_update *facts, bool *is_active);

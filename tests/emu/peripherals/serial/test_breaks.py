@@ -74,7 +74,7 @@ def test_disabling_the_transmitter_ends_a_break(rig):
 
 
 def test_a_break_from_outside_still_has_its_mark(rig):
-    """The marks of received frames are unchanged: a queued break has FERR."""
+    """A break that comes to the receiver from outside the chip sets FERR."""
     enable(rig)
     rig.dev.uart[1].feed(b"\x00", errors=BREAK)
     rig.at(3_000)
