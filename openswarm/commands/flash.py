@@ -73,7 +73,7 @@ def run(options: argparse.Namespace) -> int:
     key = None if options.key is None else read_key(options.key)
     if is_program(image):
         program = program_of(image)
-        return _with_robot(options, _ProgramTransfer(options, program if key is None else authenticated(program, key)))
+        return _with_robot(options, _ProgramTransfer(options, program, key))
     if options.store:
         raise ValueError(f"{image.path}: --store is for programs that `openswarm program` has built")
     checked(image)
@@ -138,13 +138,14 @@ class _ProgramTransfer:
     hint = ""
     keeps = "the robot keeps them until a reset"
 
-    def __init__(self, options: argparse.Namespace, program: Program) -> None:
+    def __init__(self, options: argparse.Namespace, program: Program, key: bytes | None) -> None:
         self._options: Final = options
-        self._program: Final = program
+        self._program: Final = program if key is None else authenticated(program, key)
+        self._key: Final = key
         self._is_active = False
 
     def converse(self, line: SerialPort, progress: Callable[[int, int], None]) -> None:
-        self._neighbour = HostNeighbour(line, self._program, self._options.wait)
+        self._neighbour = HostNeighbour(line, self._program, self._options.wait, self._key)
         self._is_active = self._neighbour.send(progress)
         if not self._is_active and not self._options.store:
             self._neighbour.activate()

@@ -11,12 +11,13 @@ import binascii
 from dataclasses import dataclass
 from typing import Final
 
+from openswarm.flashing.ascon import BYTES, tag
 from openswarm.flashing.loaders import ROW_BYTES
 from openswarm.flashing.program import Program
 
 MESSAGE: Final = 8
 _KINDS, _ROW = 0xE0, 0x1F
-_ADVERTISEMENT, _REQUEST, _DATA = 0x80, 0xA0, 0xC0
+_ADVERTISEMENT, _REQUEST, _DATA, _PROOF = 0x80, 0xA0, 0xC0, 0xE0
 _IDENTITY: Final = 0x07FF
 _PART: Final = 5
 PARTS: Final = -(-ROW_BYTES // _PART)
@@ -83,6 +84,14 @@ def data(program: Program, row: int, part: int) -> bytes:
     own = identity(program.crc)
     head = bytes([_DATA | row, part << 3 | own >> 8, own & 0xFF])
     return head + program.rows[row][part * _PART : (part + 1) * _PART].ljust(_PART, b"\0")
+
+
+def proof(advertisement: bytes, key: bytes) -> bytes:
+    """Return the message that proves an advertisement to robots with the key of the swarm (16 bytes).
+
+    It is the start of the advertisement's tag, with the kind of the message instead of the first byte.
+    """
+    return bytes([_PROOF]) + tag(key, advertisement.ljust(BYTES, b"\0"), advertisement)[1:MESSAGE]
 
 
 def framed(message: bytes) -> bytes:

@@ -20,6 +20,7 @@ from openswarm.flashing.messages import (
     data,
     framed,
     identity,
+    proof,
     read,
     unframed,
 )
@@ -51,12 +52,16 @@ class TransferCounts:
 class HostNeighbour:
     """Host side of a transfer: acts as a neighbour of one robot."""
 
-    def __init__(self, line: Line, program: Program, wait: float) -> None:
-        """Create the neighbour. The transfer fails if the robot makes no progress for `wait` seconds."""
+    def __init__(self, line: Line, program: Program, wait: float, key: bytes | None = None) -> None:
+        """Create the neighbour. The transfer fails if the robot makes no progress for `wait` seconds.
+
+        `key` proves the advertisements to robots that authenticate them.
+        """
         self.counts: Final = TransferCounts()
         self._line: Final = line
         self._program: Final = program
         self._wait: Final = wait
+        self._key: Final = key
         self._heard = b""
         self._own: int | None = None
         """Version that the robot has advertised."""
@@ -81,8 +86,10 @@ class HostNeighbour:
         self._line.write(framed(NOTHING.packed()))
 
     def _advertise(self, is_active: bool) -> None:
-        facts = Advertisement(self._program.version, len(self._program.rows), self._program.crc, is_active)
-        self._line.write(framed(facts.packed()))
+        facts = Advertisement(self._program.version, len(self._program.rows), self._program.crc, is_active).packed()
+        self._line.write(framed(facts))
+        if self._key is not None:
+            self._line.write(framed(proof(facts, self._key)))
 
     def _matches(self, said: Advertisement | Request) -> bool:
         if isinstance(said, Request):
@@ -170,8 +177,9 @@ class HostNeighbour:
             what = "repeats its request for" if asks else "fell silent at"
             return f"the robot {what} row {self._asked.row}: it keeps the rows that it has, run the command again"
         if self._own is not None:
+            lacks = "" if self._key is not None else ", or it believes only a host with its key (--key)"
             return (f"the robot has version {self._own} and does not ask for version {self._program.version}: the"
-                    f" running program is still on trial, or the flash does not keep data")  # fmt: skip
+                    f" running program is still on trial, or the flash does not keep data{lacks}")  # fmt: skip
         return (f"no robot answered within {self._wait:g} s: its firmware must accept programs from this port, as"
                 f" firmware/apps/spreading does")  # fmt: skip
 
@@ -184,4 +192,5 @@ class HostNeighbour:
             for said in self._messages(self._line.now() + GREETING_SECONDS):
                 if isinstance(said, Advertisement) and self._matches(said) and said.is_active:
                     return
-        raise RobotError(f"the robot has version {self._program.version} and does not activate it")
+        lacks = "" if self._key is not None else ": it may believe only a host with its key (--key)"
+        raise RobotError(f"the robot has version {self._program.version} and does not activate it{lacks}")

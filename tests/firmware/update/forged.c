@@ -1,5 +1,6 @@
-/* Forged, replayed, truncated and downgraded programs, with right CRCs, for a robot that authenticates updates. Every
- * single bit of a program and of each frame of a transfer is changed once. Prints the numbers of attacks. */
+/* Forged, replayed, truncated and downgraded programs, with right CRCs, for a robot that authenticates updates, and
+ * such advertisements. Every single bit of a program, of an advertisement and of each frame of a transfer is changed
+ * once. Prints the numbers of attacks. */
 #include "neighbours.c"
 
 enum { OLD = 2, NEW = PROGRAMS - 1, ROWS = 3, TAG = HAL_UPDATE_ROW - SYS_ASCON_BYTES, SECONDS = 1000 / SYS_SPREAD_TICK };
@@ -120,7 +121,7 @@ static long replay(void)
     take(8);
     check(is_whole(0, &have) && is_whole(1, &have), "both stores are full");
     sys_update false_one = {65535, 1, 1};
-    check(Sys_Begin_Update(&false_one), "an advertisement is not authenticated");
+    check(Sys_Begin_Update(&false_one), "the beginning of a transfer is not authenticated, only its message");
     for (int start = 0; start < 2; start++) {
         for (int i = 0; i < 5; i++) {
             copy(older[i]);
@@ -135,6 +136,73 @@ static long replay(void)
     return 2 * 5;
 }
 
+/* Makes an advertisement and its proof as a neighbour with these facts does. */
+static void prove(const sys_update *facts, bool active, uint8 *advertisement, uint8 *proof)
+{
+    sys_update own = have;
+    bool own_active = is_active;
+    have = *facts;
+    is_active = active;
+    advertise(advertisement);
+    Sys_Prove_Advertisement(advertisement, proof);
+    have = own;
+    is_active = own_active;
+}
+
+/* Returns whether a robot with two stored programs, of which the older one runs, begins another one or activates the
+ * newer one when it receives an advertisement and a proof. */
+static bool is_believed(const uint8 *advertisement, const uint8 *proof)
+{
+    static uint8 cells_before[SLOTS][HAL_UPDATE_ROWS + 1][HAL_UPDATE_ROW];
+    memcpy(cells_before, cells, sizeof cells);
+    Sys_Start_Spreading(1);
+    Sys_Hear_Update(now, advertisement);
+    Sys_Hear_Update(now, proof);
+    bool is = want.version != 0 || is_active;
+    check(is || memcmp(cells, cells_before, sizeof cells) == 0, "a forged advertisement erases nothing");
+    return is;
+}
+
+static long forge_advertisements(void)
+{
+    enum { STORED = 8, BITS = SYS_SPREAD_BYTES * 8 };
+    static const int older[] = {0, OLD, 4, 6};
+    uint8 own[SYS_ASCON_BYTES], m[SYS_SPREAD_BYTES], proof[SYS_SPREAD_BYTES];
+    long attacks = 0;
+    restore();
+    take(STORED);
+    memcpy(own, swarm_key, sizeof own);
+    for (int active = 0; active < 2; active++) {
+        const sys_update *facts = &programs[active ? STORED : NEW].facts;
+        prove(facts, active, m, proof);
+        for (int bit = 0; bit < 2 * BITS; bit++, attacks++) {
+            uint8 *changed = bit < BITS ? m : proof;
+            changed[bit / 8 % SYS_SPREAD_BYTES] ^= (uint8)(1u << bit % 8);
+            check(!is_believed(m, proof), "an advertisement or a proof with a changed bit");
+            changed[bit / 8 % SYS_SPREAD_BYTES] ^= (uint8)(1u << bit % 8);
+        }
+        for (int bit = 0; bit < SYS_ASCON_BYTES * 8; bit++, attacks++) {
+            swarm_key[bit / 8] ^= (uint8)(1u << bit % 8);
+            prove(facts, active, m, proof);
+            memcpy(swarm_key, own, sizeof own);
+            check(!is_believed(m, proof), "the proof of another key");
+        }
+        memset(swarm_key, 0xFF, sizeof swarm_key);
+        prove(facts, active, m, proof);
+        check(!is_believed(m, proof), "a robot without a key believes no advertisement");
+        check(!Sys_Prove_Advertisement(m, proof), "and proves none");
+        memcpy(swarm_key, own, sizeof own);
+        attacks++;
+    }
+    for (int i = 0; i < 4; i++, attacks++) {
+        prove(&programs[older[i]].facts, true, m, proof);
+        check(!is_believed(m, proof), "a replayed advertisement of a lower version");
+    }
+    prove(&programs[NEW].facts, false, m, proof);
+    check(is_believed(m, proof) && want.version == programs[NEW].facts.version, "a true one is believed");
+    return attacks;
+}
+
 /* Delivers a neighbour's frames in order and changes a bit of frame `spoilt`. Returns the number of frames. */
 static long transfer(long spoilt, int bit, int seconds)
 {
@@ -143,14 +211,13 @@ static long transfer(long spoilt, int bit, int seconds)
         uint8 m[SYS_SPREAD_BYTES];
         uint8 r = row;
         if (t % SECONDS == 0) {
+            uint8 both[2][SYS_SPREAD_BYTES];
             is_active = false;
-            sys_update own = have;
-            have = programs[NEW].facts;
-            advertise(m);
-            have = own;
-            m[bit / 8] ^= frames == spoilt ? (uint8)(1u << bit % 8) : 0;
-            Sys_Hear_Update(now, m);
-            frames++;
+            prove(&programs[NEW].facts, false, both[0], both[1]);
+            for (int i = 0; i < 2; i++, frames++) {
+                both[i][bit / 8] ^= frames == spoilt ? (uint8)(1u << bit % 8) : 0;
+                Sys_Hear_Update(now, both[i]);
+            }
         }
         now += SYS_SPREAD_TICK;
         if (!Sys_Spread(now, m) || (m[0] & KINDS) != REQUEST || want.crc != programs[NEW].facts.crc) {
@@ -199,6 +266,8 @@ int main(void)
     check(Sys_Activate_Update(programs[OLD].facts.version) && Sys_Start_Update() != 0 && Sys_Confirm_Update(), "it runs");
     keep();
     long forgeries = forge(), keys = forge_keys(), replays = replay(), frames = spoil_frames();
-    printf("%ld forgeries, %ld keys, %ld replays, %ld frames\n", forgeries, keys, replays, frames);
+    long advertisements = forge_advertisements();
+    printf("%ld forgeries, %ld keys, %ld replays, %ld frames, ", forgeries, keys, replays, frames);
+    printf("%ld advertisements\n", advertisements);
     return 0;
 }

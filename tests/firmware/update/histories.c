@@ -79,6 +79,7 @@ static void silence(void)
         tick();
     }
     check(kinds[REQUESTED] == 0 && kinds[SENT] == 0 && kinds[ADVERTISED] <= 11, "and stays so");
+    check(kinds[PROVED] == (IS_AUTHENTICATED && have.version != 0 ? kinds[ADVERTISED] : 0), "each is proved");
 }
 
 static void histories(void)

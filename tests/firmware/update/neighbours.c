@@ -5,6 +5,7 @@ enum {
     ADVERTISED = ADVERTISEMENT >> 5 & 3,
     REQUESTED = REQUEST >> 5 & 3,
     SENT = DATA >> 5 & 3,
+    PROVED = PROOF >> 5 & 3,
     MINUTE = 60000 / SYS_SPREAD_TICK
 };
 
@@ -35,6 +36,7 @@ static void tick(void)
     sent++;
 }
 
+/* Hears an advertisement, and in builds with tags its proof if the program is a true one: only its owner has the key. */
 static void hear_advertisement(sys_update facts, bool active)
 {
     sys_update own = have;
@@ -46,6 +48,13 @@ static void hear_advertisement(sys_update facts, bool active)
     have = own;
     is_active = own_active;
     Sys_Hear_Update(now, m);
+    for (int n = 0; IS_AUTHENTICATED && n < PROGRAMS; n++) {
+        if (is_same(&facts, &programs[n].facts)) {
+            uint8 proof[SYS_SPREAD_BYTES];
+            check(Sys_Prove_Advertisement(m, proof), "the robot has a key");
+            Sys_Hear_Update(now, proof);
+        }
+    }
 }
 
 static void hear_part(int n, uint8 r, uint8 part)

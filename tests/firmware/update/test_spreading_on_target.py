@@ -145,7 +145,9 @@ class Attacker(HostNeighbour):
 def test_a_robot_with_a_key_takes_only_programs_of_its_key(image, programs):
     """A robot that authenticates programs refuses those without its tag, and an authentic lower version.
 
-    All arrive whole, with right CRCs: a program without a tag, and one that has lost its first rows and kept the tag.
+    A host without the key is not asked for any row. From one that has it, forged programs arrive whole, with right
+    CRCs: one without a tag, and one that has lost its first rows and kept the tag. Without the key, an authentic
+    program that is stored is not activated.
     """
     key = bytes(range(1, 17))
     path = image("spreading", None, "DEVICES=infrared update update_auth")
@@ -158,13 +160,17 @@ def test_a_robot_with_a_key_takes_only_programs_of_its_key(image, programs):
         robot.program.put(row[0] + 2 * at, word)
     line, true = Line(robot), authenticated(of(programs[4]), key)
     cut = Program(5, true.rows[-1:])
+    with pytest.raises(RobotError, match=r"the robot has version 0 and does not ask for version 4: .* \(--key\)"):
+        HostNeighbour(line, true, 4.0).send(lambda done, total: None)
     for forged in (of(programs[5]), cut):
         with pytest.raises(RobotError, match=r"does not keep the program after .* tag of the robot's key"):
-            HostNeighbour(line, forged, 4.0).send(lambda done, total: None)
-    assert HostNeighbour(line, true, 4.0).send(lambda done, total: None) is False
+            HostNeighbour(line, forged, 4.0, key).send(lambda done, total: None)
+    assert HostNeighbour(line, true, 4.0, key).send(lambda done, total: None) is False
     with pytest.raises(RobotError, match="the robot has version 4 and does not ask for version 3"):
-        Attacker(line, authenticated(Program(3, true.rows), key), 4.0).send(lambda done, total: None)
-    host = HostNeighbour(line, true, 4.0)
+        Attacker(line, authenticated(Program(3, true.rows), key), 4.0, key).send(lambda done, total: None)
+    with pytest.raises(RobotError, match=r"the robot has version 4 and does not activate it: .* \(--key\)"):
+        HostNeighbour(line, true, 4.0).activate()
+    host = HostNeighbour(line, true, 4.0, key)
     assert host.send(lambda done, total: None) is False
     host.activate()
     run_until_stored(robot, true)

@@ -59,12 +59,14 @@ def test_forged_and_replayed_programs_are_refused(tmp_path):
     """Every single bit of a program, of its version and size, and of each frame of a transfer is changed once.
 
     CRCs are right. Also refused: every other number of rows, tags of keys with one other bit, a robot's erased key, and
-    versions that the robot had before, although an unauthentic advertisement made it erase the highest one.
+    versions that the robot had before, although a transfer that never ended has erased the highest one. Advertisements
+    and their proofs are attacked in the same way; those that are not believed erase and activate nothing.
     """
     said = on_host("forged", tmp_path, ATTACKED)
-    forgeries, keys, replays, frames = (int(number) for number in re.findall(r"(\d+) \w", said))
+    forgeries, keys, replays, frames, advertisements = (int(number) for number in re.findall(r"(\d+) \w", said))
     assert forgeries == 3 * ROW_BYTES * 8 + 24 + ROWS + 2
     assert (keys, replays) == (16 * 8 + 1, 10)
+    assert advertisements == 2 * (2 * 64 + 16 * 8 + 1) + 4
     assert frames % 64 == 0
     assert frames > 3 * 20 * 64
 
@@ -73,7 +75,8 @@ def test_forged_and_replayed_programs_are_refused(tmp_path):
     ("line", "replacement", "failure"),
     [
         ("difference |= ", "difference &= ", "a program with a changed bit"),
-        ("!is_erased(key)", "true", "a robot without a key takes nothing"),
+        ("return all != 0xFF;", "return true;", "a robot without a key takes nothing"),
+        ("proof[i] = tag[i];", "proof[i] = 0;", "an advertisement or a proof with a changed bit"),
         ("return version > highest();", "return version > 0 * highest();", "a version that is not above all before"),
     ],
 )

@@ -3,12 +3,15 @@
  * rules are Deluge's, with rows instead of pages. */
 #include "spread.h"
 
+#include "authentication.h"
+
 #include <string.h>
 
 enum {
     ADVERTISEMENT = 0x80, /* +1: activated.  bytes: version 2, rows 1, CRC 4 */
     REQUEST = 0xA0,       /* + row.  bytes: version 2, missing parts 3, identity 2 */
     DATA = 0xC0,          /* + row.  part * 8 + upper bits of the identity, its low byte, 5 data bytes */
+    PROOF = SYS_PROOF_KIND, /* tag of the advertisement before, 7: with update_auth only */
     KINDS = 0xE0,
     ROW = 0x1F,
     IDENTITY = 0x07FF, /* bits of the CRC that identify a program: two of one version share no rows */
@@ -47,6 +50,8 @@ static uint32 forgiven_at;
 static uint32 clock, interval, begun, advertise_at, ask_at, useful_at;
 static uint8 heard;
 static uint32 noise;
+static uint8 claimed[SYS_SPREAD_BYTES]; /* advertisement that waits for its proof; first byte 0: none */
+static bool owes_proof;                 /* of the last advertisement sent */
 
 static uint16 draw(uint16 below)
 {
@@ -124,7 +129,8 @@ void Sys_Start_Spreading(uint16 number)
 {
     noise = number * 2654435761u;
     want.version = vain.version = 0;
-    failures = 0;
+    failures = claimed[0] = 0;
+    owes_proof = false;
     refresh();
     begin_interval(SHORTEST);
 }
@@ -164,13 +170,18 @@ static bool is_newer(const sys_update *their)
             (asked == MOST_ASKED && !is_same(their, &want)));
 }
 
-static void on_advertisement(const uint8 *m)
+/* An advertisement that erases a store or activates a program needs a proof; others cost a few messages at most. */
+static void on_advertisement(const uint8 *m, bool is_proved)
 {
     sys_update their = {(uint16)(m[1] | (uint16)m[2] << 8), m[3],
                         m[4] | (uint32)m[5] << 8 | (uint32)m[6] << 16 | (uint32)m[7] << 24};
     bool theirs_is_active = (m[0] & 1u) != 0;
     bool is_ours = is_same(&their, &have);
     if (is_newer(&their)) {
+        if (!is_proved) {
+            memcpy(claimed, m, sizeof claimed);
+            return;
+        }
         sys_update before = want;
         if (Sys_Begin_Update(&their)) {
             vain =
@@ -187,6 +198,10 @@ static void on_advertisement(const uint8 *m)
     } else if (their.version < have.version || (is_ours && is_active && !theirs_is_active)) {
         reset_interval(); /* so that the other robot hears of it soon */
     } else if (is_ours && theirs_is_active && !is_active) {
+        if (!is_proved) {
+            memcpy(claimed, m, sizeof claimed);
+            return;
+        }
         (void)Sys_Offer_Activation(have.version);
     } else if (is_ours) {
         heard += heard != 0xFF;
@@ -273,12 +288,23 @@ static void on_data(const uint8 *m)
     begin_interval(SHORTEST);
 }
 
+static bool is_proof(const uint8 *m)
+{
+    uint8 right[SYS_SPREAD_BYTES];
+    return (m[0] & KINDS) == PROOF && claimed[0] != 0 && Sys_Prove_Advertisement(claimed, right) &&
+           memcmp(m, right, sizeof right) == 0;
+}
+
 void Sys_Hear_Update(uint32 now, const uint8 *message)
 {
+    bool is_proved = !SYS_NEEDS_PROOFS || is_proof(message);
     clock = now;
+    if (SYS_NEEDS_PROOFS && is_proved) {
+        message = claimed;
+    }
     switch (message[0] & KINDS) {
     case ADVERTISEMENT:
-        on_advertisement(message);
+        on_advertisement(message, is_proved);
         break;
     case REQUEST:
         on_request(message);
@@ -355,10 +381,17 @@ bool Sys_Spread(uint32 now, uint8 *message)
     if (now - forgiven_at >= FORGIVEN) {
         forgive();
     }
+    if (owes_proof) {
+        uint8 whole[SYS_SPREAD_BYTES];
+        owes_proof = false;
+        advertise(whole);
+        return Sys_Prove_Advertisement(whole, message);
+    }
     /* Rare messages first: requests for parts may never end. */
     if (advertise_at != begun && is_due(advertise_at)) {
         advertise_at = begun; /* once per interval */
         if (heard < ENOUGH) {
+            owes_proof = SYS_NEEDS_PROOFS && have.version != 0;
             return advertise(message);
         }
     }

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The tag of a program (README.md) and the highest version kept, in two records of which one is always valid. */
+/* The tags of programs and advertisements (README.md), and the highest version kept, in two records of which one is
+ * always valid. */
 #include "ascon.h"
 #include "authentication.h"
 #include "hal_update_auth.h"
@@ -8,14 +9,15 @@ enum { BLOCKS = HAL_UPDATE_ROW / SYS_ASCON_BYTES };
 
 static uint8 authentic; /* bit n: the tag of store n was right */
 
-/* An erased key is known to all. */
-static bool is_erased(const uint8 *key)
+/* Reads the key. false: it is erased, and an erased key is known to all. */
+static bool __attribute__((noinline)) read_key(uint8 *key)
 {
     uint8 all = 0xFF;
+    hal_update_key(key);
     for (uint8 i = 0; i < SYS_ASCON_BYTES; i++) {
         all &= key[i];
     }
-    return all == 0xFF;
+    return all != 0xFF;
 }
 
 static bool has_tag(uint8 store, const sys_update *facts)
@@ -24,7 +26,7 @@ static bool has_tag(uint8 store, const sys_update *facts)
     uint8 nonce[SYS_ASCON_BYTES] = {(uint8)facts->version, (uint8)(facts->version >> 8), facts->rows};
     uint8 difference = 0;
     sys_ascon mac;
-    hal_update_key(key);
+    bool has_key = read_key(key);
     Sys_Begin_AsconMac(&mac, key, nonce);
     for (uint8 i = 1; i <= facts->rows; i++) {
         uint8 blocks = i < facts->rows ? BLOCKS : BLOCKS - 1; /* the last block of the last row is the tag */
@@ -37,7 +39,24 @@ static bool has_tag(uint8 store, const sys_update *facts)
     for (uint8 i = 0; i < SYS_ASCON_BYTES; i++) {
         difference |= tag[i] ^ row[(BLOCKS - 1) * SYS_ASCON_BYTES + i];
     }
-    return difference == 0 && !is_erased(key);
+    return difference == 0 && has_key;
+}
+
+bool Sys_Prove_Advertisement(const uint8 *advertisement, uint8 *proof)
+{
+    uint8 key[SYS_ASCON_BYTES], tag[SYS_ASCON_BYTES], nonce[SYS_ASCON_BYTES];
+    sys_ascon mac;
+    for (uint8 i = 0; i < SYS_ASCON_BYTES; i++) { /* the number of rows is where the nonce of a program has a zero */
+        nonce[i] = i < SYS_ADVERTISEMENT_BYTES ? advertisement[i] : 0;
+    }
+    bool has_key = read_key(key);
+    Sys_Begin_AsconMac(&mac, key, nonce);
+    Sys_End_AsconMac(&mac, key, advertisement, SYS_ADVERTISEMENT_BYTES, tag);
+    proof[0] = SYS_PROOF_KIND; /* instead of the tag's first byte */
+    for (uint8 i = 1; i < SYS_ADVERTISEMENT_BYTES; i++) {
+        proof[i] = tag[i];
+    }
+    return has_key;
 }
 
 bool Sys_Is_UpdateAuthentic(uint8 store, const sys_update *facts)
