@@ -37,6 +37,8 @@ from emu.inject.faults import KINDS
 UARTS: Final = ("uart1", "uart2")
 LONGEST_SECONDS: Final = 3600
 """Maximum simulated time of a trial."""
+SHOWN_BITS: Final = 64
+"""Longest integer that an error message repeats."""
 _KEYS: Final[dict[str, tuple[str, ...]]] = {
     "": ("seed", "trials", "run", "input", "detect", "faults"),
     "run": ("seconds", "start", "selector", "hang"),
@@ -76,6 +78,8 @@ class _Reader:
             line = re.search(r"at line (\d+)", str(error))
             where = line[1] if line is not None else len(text.splitlines())
             raise CampaignError(f"{name}:{where}: {error}") from None
+        except (RecursionError, ValueError) as error:  # nested too deeply, an integer of too many digits
+            raise CampaignError(f"{name}: {error}") from None
 
     def fail(self, section: str, key: str, expected: str) -> CampaignError:
         """Return an error that names the line of a key, or of its section if the key is missing."""
@@ -106,7 +110,9 @@ class _Reader:
         fits = isinstance(value, int | float if kind is float else int) and not isinstance(value, bool)
         if not fits or not least <= value <= most:
             what = "a number" if kind is float else "a whole number"
-            raise self.fail(section, key, f"{key}: expected {what} from {least:g} to {most:g}, not {value!r}")
+            is_long = isinstance(value, int) and value.bit_length() > SHOWN_BITS
+            found = f"one of {value.bit_length()} bits" if is_long else repr(value)
+            raise self.fail(section, key, f"{key}: expected {what} from {least:g} to {most:g}, not {found}")
         return kind(value)
 
 

@@ -84,6 +84,7 @@ def test_a_trial_says_what_it_was_made_from(tmp_path: Path) -> None:
         (["run", "clustering", "--brain", __file__], "test_campaign.py"),
         (["run", "clustering", *SHORT, "--set", "range=3"], "expected SECTION.KEY=VALUE"),
         (["run", "clustering", *SHORT, "--set", "camera.range_cm=far"], "camera.range_cm is 'far'; expected float"),
+        (["run", "clustering", *SHORT, "--set", f"camera.range_cm={'[' * 2000}"], "expected float"),
         (["run", "clustering", *SHORT, "--trials", "0"], "expected a whole number of 1 or more"),
         (["run", "clustering", *SHORT, "--processes", "2"], "the option no longer exists: use `--jobs N`"),
         (["compare", "nowhere", "elsewhere"], "no finished trials"),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import re
 from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
@@ -195,6 +196,7 @@ def test_intervals_are_wilson_s():
         ('["mismatch"]', '["("]', 9, "expected regular expressions"),
         ("flash = 2", "flash = -1", 13, "flash: expected a whole number from 0"),
         ("flash = 2", "flash = ", 13, "Invalid value"),
+        ("flash = 2", f"flash = 0x{'f' * 5000}", 13, "from 0 to 1e+06, not one of 20000 bits"),
     ],
 )
 def test_errors_are_reported_with_their_line(tmp_path, old, new, line, expected):
@@ -204,6 +206,14 @@ def test_errors_are_reported_with_their_line(tmp_path, old, new, line, expected)
         read(path)
     assert str(raised.value).startswith(f"{path}:{line}: ")
     assert expected in str(raised.value)
+
+
+@pytest.mark.parametrize("value", ["[" * 2000, "{a = " * 2000, "9" * 5000], ids=["lists", "tables", "digits"])
+def test_values_that_the_parser_gives_up_are_refused(tmp_path, value):
+    path = tmp_path / "campaign.toml"
+    path.write_text(CAMPAIGN.replace("flash = 2", f"flash = {value}"))
+    with pytest.raises(CampaignError, match=re.escape(f"{path}: ")):
+        read(path)
 
 
 def test_the_campaign_of_the_documents_is_one():
