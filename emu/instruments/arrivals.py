@@ -77,7 +77,7 @@ class Arrivals:
         """Return all logged arrivals in order."""
         return [
             Arrival(cycle, self._places[place], tuple(map(_decoded, self._types, values)))
-            for cycle, place, *values in self._log.entries().tolist()
+            for cycle, place, *values in self._log.entries()
         ]
 
     def frame(self) -> Any:

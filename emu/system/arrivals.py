@@ -1,17 +1,15 @@
 """Arrivals at hooked program addresses: counts, and a log that native code and Python append to.
 
-Input: the state record, the numbers to log. Output: the count of each address, and arrays of entries. An arrival is
+Input: the state record, the numbers to log. Output: the count of each address, and a list of entries. An arrival is
 recorded before the instruction at the address runs, with the numbers that it finds.
 """
 
 from __future__ import annotations
 
 import ctypes
+from array import array
 from dataclasses import dataclass
 from typing import Final
-
-import numpy as np
-import numpy.typing as npt
 
 from emu.system.record import Record
 
@@ -52,27 +50,28 @@ class ArrivalLog:
         self._record: Final = record
         self._cycle: Final = record.fields["cpu.cycle"].index
         self._places: Final = places
-        first = COUNTS + places
-        width = 2 + len(numbers)
-        self._words: Final = (ctypes.c_uint64 * (first + (width * ROOM if is_logged else 0)))()
+        self._width: Final = 2 + len(numbers)
+        self._first: Final = COUNTS + places
+        self._words: Final = (ctypes.c_uint64 * (self._first + (self._width * ROOM if is_logged else 0)))()
         self.address: Final = ctypes.addressof(self._words)
         """Host address of the memory."""
-        self._memory: Final = np.frombuffer(memoryview(self._words).cast("B"), dtype=np.uint64)
-        self._entries: Final = self._memory[first:].reshape(-1, width)
-        self._full: Final[list[npt.NDArray[np.uint64]]] = []
+        self._full: Final = array("Q")
         """Entries that were taken from the memory when it was full."""
-        self.hooks: Final = [
-            ArrivalHook(self, Recording(place, first if is_logged else None, numbers)) for place in range(places)
-        ]
+        first = self._first if is_logged else None
+        self.hooks: Final = [ArrivalHook(self, Recording(place, first, numbers)) for place in range(places)]
 
     @property
     def counts(self) -> list[int]:
         """Return the number of arrivals by place."""
         return self._words[COUNTS : COUNTS + self._places]
 
-    def entries(self) -> npt.NDArray[np.uint64]:
-        """Return all entries in order, one row each: cycle, place, numbers."""
-        return np.concatenate([*self._full, self._entries[: self._words[LOGGED]]])
+    def entries(self) -> list[list[int]]:
+        """Return all entries in order: cycle, place, numbers."""
+        words = [*self._full, *self._in_memory()]
+        return [words[at : at + self._width] for at in range(0, len(words), self._width)]
+
+    def _in_memory(self) -> list[int]:
+        return self._words[self._first : self._first + self._width * self._words[LOGGED]]
 
     def add(self, recording: Recording) -> None:
         """Record an arrival in the present cycle."""
@@ -81,11 +80,11 @@ class ArrivalLog:
         if recording.first is None:
             return
         if words[LOGGED] == ROOM:
-            self._full.append(self._entries.copy())
+            self._full.extend(self._in_memory())
             words[LOGGED] = 0
-        data = self._record.bytes
+        data, at = self._record.bytes, self._first + self._width * words[LOGGED]
         numbers = [int.from_bytes(data[one.address : one.address + one.size], "little") for one in recording.numbers]
-        self._entries[words[LOGGED]] = [self._record.u64[self._cycle], recording.place, *numbers]
+        words[at : at + self._width] = [self._record.u64[self._cycle], recording.place, *numbers]
         words[LOGGED] += 1
 
 

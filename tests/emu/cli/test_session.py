@@ -121,3 +121,14 @@ def test_modules_are_imported_lazily():
     )
     done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "set()"
+
+
+def test_a_run_without_instruments_imports_no_numpy():
+    """The import would take half of the CPU time from the start of `emu run` to the first byte."""
+    code = (
+        "import sys, emu\n"
+        "machine = emu.load('tests/emu/cli/hello.hex')\n"
+        "print(machine.run().reason, 'numpy' in sys.modules)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ["halt", "False"]

@@ -182,7 +182,7 @@ def _run(
                 stop = advance(cycle)
                 if (stop is not None and stop.reason == "halt") or machine.cycle == before:
                     break
-    return machine, machine.snapshot(), sorted(sent), names, arrivals.entries().tolist()
+    return machine, machine.snapshot(), sorted(sent), names, arrivals.entries()
 
 
 def check_observed(seed: int, tally: Counter[str], chip: Chip = DSPIC30F6014A) -> None:
