@@ -156,7 +156,9 @@ def _camera_views(trial: Trial) -> list[tuple[list[int], list[bytes]]]:
     count = scene.robots.count
     views: list[tuple[list[int], list[bytes]]] = []
     headings = [trial.columns[f"r{robot}_heading"] for robot in range(count)]
-    robots, objects = trial.robots.tolist(), trial.object_poses
+    places = zip(trial.robots.tolist(), trial.object_poses, strict=True)
+    poses = [Poses([(x, y, float(headings[i][sample])) for i, (x, y) in enumerate(robots)], objects)
+             for sample, (robots, objects) in enumerate(places)]  # fmt: skip
     for robot in range(count):
         seen, strips = list(map(int, trial.columns[f"r{robot}_seen"])), list(trial.columns[f"r{robot}_strip"])
         if not scene.robot_kind(robot).has_camera:
@@ -165,14 +167,11 @@ def _camera_views(trial: Trial) -> list[tuple[list[int], list[bytes]]]:
         is_script = not any(strips)
         traits = traits_of(scene, seed, robot)
         renderer, sight = Renderer(scene, robot, traits), LineOfSight(scene, robot, traits)
-        for sample, (places, things) in enumerate(zip(robots, objects, strict=True)):
-            if seen[sample] >= 0 and not is_script:
-                continue
-            poses = Poses([(x, y, float(headings[i][sample])) for i, (x, y) in enumerate(places)], things)
+        for sample, now in enumerate(poses):
             if seen[sample] < 0:
-                seen[sample] = sight.look(poses)
+                seen[sample] = sight.look(now)
             if is_script:
-                renderer.set_viewpoint(poses)
+                renderer.set_viewpoint(now)
                 strips[sample] = colours[renderer.classify_row(_MIDDLE_ROW, _STRIP)].tobytes()
         views.append((seen, strips))
     return views
