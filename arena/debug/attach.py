@@ -13,7 +13,8 @@ from contextlib import suppress
 from queue import Empty, SimpleQueue
 from typing import Final
 
-from arena.debug.controlled_robot import ControlledRobot, RobotHistory
+from arena.debug.controlled_robot import ControlledRobot
+from arena.debug.robot_history import RobotHistory
 from arena.replay.http import LOOPBACK
 from emu.dap.server import Server
 from emu.dap.wire import Message, Wire, wire_over
@@ -22,14 +23,6 @@ from emu.machine.machine import Machine
 POLL_S: Final = 0.01
 """Longest time, in seconds, that the studio waits for commands between two looks at the client's messages."""
 PAST: Final = "this is the past, and the other robots have seen what came of it: go back to the present to change it"
-
-
-class _PresentOnlyHistory(RobotHistory):
-    """History of a robot that can be changed in its present only."""
-
-    @property
-    def read_only_reason(self) -> str:
-        return PAST if self.is_past else ""
 
 
 class _PollingInbox(SimpleQueue[Message | None]):
@@ -78,8 +71,12 @@ class AttachedRobot(ControlledRobot):
 
     def record(self, machine: Machine) -> RobotHistory:
         """Create the history of the robot; the world cannot go back with it."""
-        self._history = _PresentOnlyHistory(self, machine)
+        self._history = self._new_history(machine)
         return self._history
+
+    def read_only(self, is_past: bool) -> str:
+        """As `ControlledRobot.read_only`: the robot can be changed in its present only."""
+        return PAST if is_past else ""
 
     def _serve(self) -> bool:
         try:

@@ -4,29 +4,33 @@ There are two greenlets: that of the trial, in which the robot runs, and that of
 only in the trial's greenlet, at most to the next end of a quantum. All its inputs therefore come from the world.
 Between two such runs, the debugger decides how far the machine may run.
 
-The inputs of the robot are logged (`InputLog`). The debugger's greenlet can therefore run the past of the robot again
-without the world, which stays in the present. If the user inspects the world of the past, or changes the past,
-`ReplayRequired` aborts the trial. The trial then runs again from its seed to the cycle of the robot. The new robots
-equal the old ones to the bit, and the debugger continues with them.
+The inputs of the robot are logged (`InputLog`, `CrowdMember`). The debugger's greenlet can therefore run the past of
+the robot again without the world, which stays in the present. If the user inspects the world of the past, or changes
+the past, `ReplayRequired` aborts the trial. The trial then runs again from its seed to the cycle of the robot. The new
+robots equal the old ones to the bit, and the debugger continues with them.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
-from typing import Any, Final
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any, Final, cast
 
 from greenlet import getcurrent, greenlet
 
+from arena.debug.crowd_member import CrowdMember
 from arena.debug.input_log import InputLog
+from arena.debug.robot_history import NO_LIMIT, EpuckRobotHistory, KilobotRobotHistory, RobotHistory
 from arena.robots.controller import Controller
 from arena.robots.firmware_controller import FirmwareController
+from arena.robots.kilobot import KilobotController
 from arena.scene.robot_kind import EPUCK
 from arena.trial.snapshot import state_view
 from arena.world.physics import World
-from emu.debug.history import History, position
-from emu.machine.machine import Machine
-from emu.machine.stops import STILL_ASLEEP, Stop
+from emu.debug.avr.machine import DebuggedKilobot
+from emu.machine.stops import Stop
+
+if TYPE_CHECKING:
+    from emu.machine.machine import Machine
 
 OVER: Final = "the trial is over"
 
@@ -39,63 +43,9 @@ class ReplayRequired(Exception):
     """The trial must run again from its seed, because the debugger has gone back to an earlier cycle."""
 
 
-class RobotHistory(History):
-    """History of a robot of a trial: the machine alone replays the past; the present runs together with the world."""
-
-    def __init__(self, controlled: ControlledRobot, machine: Machine) -> None:
-        super().__init__(machine)
-        self._controlled: Final = controlled
-
-    @property
-    def read_only_reason(self) -> str:
-        return self._controlled.read_only_reason
-
-    def suspend(self) -> None:
-        """Remember the state of the machine: the trial runs without the debugger until `resume`."""
-        self._last_state = self.machine.snapshot()
-        self.end = self.machine.cycle
-
-    def resume(self) -> None:
-        """Record what the trial has changed in the machine since `suspend`."""
-        self._detect_change()
-
-    def _advance_present(self, cycle: int) -> Stop | None:
-        machine, stop = self.machine, None
-        while stop is None and machine.cycle < cycle:
-            stop = self._controlled.run_in_trial(lambda limit: machine.run_until(min(cycle, limit)))
-        return stop
-
-    def _step_present(self, limit: int) -> Stop | None:
-        """Step once in the present. A sleep may continue over the ends of quanta, at most to cycle `limit`."""
-        machine, stepped, last = self.machine, False, limit
-        before = position(machine)
-
-        def step(limit: int) -> Stop | None:
-            nonlocal stepped
-            limit = min(limit, last)
-            stop = machine.service_boundary(limit)
-            entered = stepped = position(machine) != before
-            if entered or stop is not None or machine.cycle >= limit:
-                return stop or machine.run_until(machine.cycle if entered else limit)
-            stepped = True
-            return machine.step(limit)
-
-        stop = None
-        while stop is None and not stepped and machine.cycle < last:
-            stop = self._controlled.run_in_trial(step)
-        if stop is None and not stepped:
-            return Stop("limit", machine.pc, machine.cycle, STILL_ASLEEP)
-        return stop
-
-    @contextmanager
-    def _replaying(self) -> Iterator[None]:
-        self.machine.pins.flush()  # pending pin changes belong to the present and must be reported in it
-        with self.machine.board.motors.history_paused(), super()._replaying():
-            yield
-
-
 class ControlledRobot:
-    """Robot number `robot` of a trial, controlled by `debugger`; the `RobotControl` of its firmware controller.
+    """Robot number `robot` of a trial, controlled by `debugger`: the `RobotControl` of an e-puck, or the `CrowdControl`
+    of a Kilobot's crowd.
 
     `debugger` is called in a greenlet of its own when the robot is switched on. It creates a history with `record`. If
     it returns true, the trial continues without it; if it returns false, `TrialAbortedError` ends the trial. With
@@ -107,21 +57,26 @@ class ControlledRobot:
 
     def __init__(self, robot: int, debugger: Callable[[ControlledRobot], bool], is_recorded: bool) -> None:
         self.is_recorded: Final = is_recorded
-        self.read_only_reason: Final = "the trial is being recorded: omit --out to change it" if is_recorded else ""
         self._robot: Final = robot
         self._debugger: Final = greenlet(lambda _first_stop: debugger(self))
 
     def attach(self, world: World, controllers: Sequence[Controller]) -> None:
         """Take control of the robot in a new or repeated trial. Raises ValueError if the robot has no firmware."""
         controller = controllers[self._robot]
-        if not isinstance(controller, FirmwareController):
+        if not isinstance(controller, FirmwareController | KilobotController):
             kind = world.scene.robot_kind(self._robot)
             why = "its brain is scripted" if kind is EPUCK else f"it is a {kind.name}"
-            raise ValueError(f"--robot {self._robot}: it has no firmware of an e-puck: {why}")
+            raise ValueError(f"--robot {self._robot}: it has no firmware for the debugger: {why}")
         self._world, self._controllers, self._controller = world, controllers, controller
         self._set_native(False)
-        self.machine = controller.machine
-        self._inputs = InputLog(self.machine)
+        if isinstance(controller, FirmwareController):
+            self.machine: Machine = controller.machine
+            self._inputs = InputLog(self.machine)
+            controller.control = self
+        else:
+            self._member = CrowdMember(controller.crowd, controller.index)
+            self.machine = cast("Machine", DebuggedKilobot(self._member))
+            controller.crowd.control = self
         self._trial: greenlet | None = None
         """Greenlet of the trial; None before the robot is switched on."""
         self._is_over = False
@@ -130,15 +85,24 @@ class ControlledRobot:
         self._cuts: list[int] = []
         self._final_stop: Stop | None = None
         """Stop after which the robot does not run again, for example a fault."""
-        controller.control = self
 
     # Called in the debugger's greenlet
 
     def record(self, machine: Machine) -> RobotHistory:
         """Create the history in which the debugger moves."""
-        self._history = RobotHistory(self, machine)
+        self._history = self._new_history(machine)
         self._history.environment = self
         return self._history
+
+    def _new_history(self, machine: Machine) -> RobotHistory:
+        """Return a new history of the robot, which cannot move the world."""
+        if isinstance(self._controller, KilobotController):
+            return KilobotRobotHistory(machine, self.run_in_trial, self.read_only, self._member)
+        return EpuckRobotHistory(machine, self.run_in_trial, self.read_only)
+
+    def read_only(self, is_past: bool) -> str:
+        """Return why the machine must not be changed in the past or the present; empty if changes are permitted."""
+        return "the trial is being recorded: omit --out to change it" if self.is_recorded else ""
 
     def run_in_trial(self, act: Callable[[int], Stop | None]) -> Stop | None:
         """Call `act(limit)` in the trial's greenlet, then let the world follow. Return the stop, if there was one."""
@@ -236,11 +200,45 @@ class ControlledRobot:
             self._history.suspend()
         return self._final_stop
 
+    def run_crowd(self, end: int) -> None:
+        """As `CrowdControl.run_crowd`, in steps that the debugger chooses."""
+        assert isinstance(self._controller, KilobotController)
+        member, crowd, stop = self._member, self._controller.crowd, None
+        member.end, member.is_at_end = end, False
+        if self._trial is None:
+            member.run_until(self.machine.cycle)
+            if member.is_at_end:  # the robot is not switched on yet
+                return
+        self._trial = self._debugger.parent = getcurrent()
+        if self._history is not None:
+            self._history.resume()
+        while not member.is_at_end and self._final_stop is None:
+            act = self._debugger.switch(stop)
+            if self._debugger.dead:
+                self._release(act)
+                break
+            if act is _request_replay:
+                raise ReplayRequired
+            if stop is not None and stop.reason == "fault":
+                self._final_stop = stop
+                member.release()
+                break
+            stop = act(NO_LIMIT)
+        if not member.is_at_end:
+            crowd.run_until(end)
+        if self._history is not None:
+            self._history.suspend()
+
     def _release(self, continues: bool) -> None:
         """Return the control to the machine after the debugger has detached; abort the trial unless it `continues`."""
         self._set_native(True)
-        self._controller.control = self.machine
-        self._history, self._inputs.is_recording = None, False
+        self._history = None
+        if isinstance(self._controller, KilobotController):
+            self._member.release()
+            self._controller.crowd.control = None
+        else:
+            self._controller.control = self.machine
+            self._inputs.is_recording = False
         if not continues:
             raise TrialAbortedError
 

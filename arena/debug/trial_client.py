@@ -13,7 +13,6 @@ from typing import Any, Final
 
 from arena.campaign.campaign import FinishedTrial, Plan
 from arena.debug.trial_process import serve
-from arena.scene.loader import FCY
 from arena.trial.checkpoints import EVERY_S, PATIENCE_S, Checkpoint, CheckpointPool, PipeClosedError, context, pipe
 from arena.trial.record import RecordError
 from emu.dap.wire import Channel, Message, Wire
@@ -71,9 +70,9 @@ class DebugSession:
         try:
             received, end = self._pipe.receive()
             match received:
-                case ("checkpoint", cycle):
+                case ("checkpoint", cycle, seconds):
                     assert end is not None
-                    self._checkpoints.add(Checkpoint(cycle, cycle / FCY, end))
+                    self._checkpoints.add(Checkpoint(cycle, seconds, end))
                 case ("rewind", cycle, count):
                     self._rewind(cycle, count)
                 case ("recorded", finished):

@@ -7,7 +7,7 @@ the debug protocol pass unchanged.
 |---|---|
 | `ready`, `waits` count | the server was started; it waits for a message and has received `count` |
 | `says` message | message of the Debug Adapter Protocol for the client |
-| `checkpoint` cycle, with a pipe | a checkpoint was forked at this cycle of the robot |
+| `checkpoint` cycle, seconds, with a pipe | a checkpoint was forked at this time of the robot |
 | `rewind` cycle, count | the trial must go back; the reply `(True,)` announces that a checkpoint will continue |
 | `leaves` state, messages | state and unread messages for this checkpoint; the process ends |
 | `left`, `alive` | the client has disconnected; the trial continues without it |
@@ -94,7 +94,7 @@ class CheckpointedRobot(ControlledRobot):
     def __init__(self, robot: int, pipe: PipeEnd, is_recorded: bool, every_s: float) -> None:
         super().__init__(robot, lambda _controlled: self._serve(), is_recorded)
         self.channel: Final = _PipeChannel(pipe)
-        self._interval: Final = every_s * FCY
+        self._every_s: Final = every_s
         self._forker: Final = ProcessForker()
         self._checkpoint_cycle: int | None = None
         """Cycle of the robot at the last checkpoint."""
@@ -125,7 +125,7 @@ class CheckpointedRobot(ControlledRobot):
     def offer_checkpoint(self, near: int | None = None) -> None:
         """As `Environment.offer_checkpoint`. After the end of the trial, none is forked."""
         cycle, last = self.machine.cycle, self._checkpoint_cycle
-        is_due = last is None or cycle - last >= self._interval
+        is_due = last is None or cycle - last >= self._every_s * self.machine.hz
         if near is not None and last is not None and not is_due:
             is_due = near - cycle <= NEAR < (cycle - last) // 2
         if is_due and CAN_FORK and not self.is_over:
@@ -148,7 +148,7 @@ class CheckpointedRobot(ControlledRobot):
         pipe, is_fork = self._fork()
         if not is_fork:
             if pipe is not None:
-                self.send("checkpoint", self.machine.cycle, end=pipe)
+                self.send("checkpoint", self.machine.cycle, self.machine.seconds, end=pipe)
                 pipe.drop()
             return
         assert pipe is not None

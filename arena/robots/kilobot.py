@@ -14,6 +14,7 @@ from typing import Final
 import numpy as np
 
 from arena.robots.controller import LedChange, Program, Reading, SerialLine, power_on_cycle
+from arena.robots.robot_control import CrowdControl
 from arena.scene.checks import overhead_commands
 from arena.scene.loader import FCY, Scene, SceneError
 from arena.scene.robot_kind import STRAIGHT_DUTY, TURN_DUTY, motor_strengths
@@ -72,6 +73,8 @@ class KilobotCrowd:
             machine.watch(registers)
         self.faults: Final[dict[int, str]] = {}
         """Faults of the firmware by the index of the robot."""
+        self.control: CrowdControl | None = None
+        """Runs the robots in place of `run_until` while a debugger has one of them."""
         self._commands: Final = overhead_commands(setting.overhead)
         self._frame_at = self._command_start()
         self._tick = -1
@@ -90,9 +93,9 @@ class KilobotCrowd:
         self._set_light(places.tolist())
         end = (tick + 1) * self._quantum * HZ // FCY
         while self._commands and self._frame_at < end:
-            self._run_until(self._frame_at)
+            self._run(self._frame_at)
             self._send()
-        self._run_until(end)
+        self._run(end)
 
     def _set_light(self, places: Sequence[Sequence[float]]) -> None:
         """Set the voltage of each sensor of ambient light if its counts have changed."""
@@ -108,15 +111,25 @@ class KilobotCrowd:
                 machine = self.swarm.robots[index]
                 machine.set_analog(machine.cycle, ADC7, microvolts(counts))
 
-    def _run_until(self, end: int) -> None:
+    def _run(self, end: int) -> None:
+        if self.control is not None:
+            self.control.run_crowd(end)
+        else:
+            self.run_until(end)
+
+    def run_until(self, end: int) -> None:
         """Run all robots to a tick of 1/8 MHz; a robot whose firmware faults stops."""
         while True:
             try:
                 self.swarm.run_until(end)
                 return
             except KilobotFaultError as fault:
-                self.faults[fault.robot] = f"stopped: {fault.what}"
-                self.swarm.stop(fault.robot)
+                self.switch_off(fault)
+
+    def switch_off(self, fault: KilobotFaultError) -> None:
+        """Stop a robot permanently because of a fault."""
+        self.faults[fault.robot] = f"stopped: {fault.what}"
+        self.swarm.stop(fault.robot)
 
     def _command_start(self) -> int:
         return round(self._commands[0][0] * HZ) if self._commands else 0
@@ -144,8 +157,9 @@ class KilobotController:
     """One Kilobot of a crowd. It drives with the mean duties of its left and right motor, 0 to 255."""
 
     def __init__(self, scene: Scene, crowd: KilobotCrowd, index: int) -> None:
-        self._crowd: Final = crowd
-        self._index: Final = index
+        self.crowd: Final = crowd
+        self.index: Final = index
+        """Index of the robot in the crowd."""
         self.machine: Final[Atmega328p] = crowd.swarm.robots[index]
         self._off_tick: Final = scene.off_tick(crowd.robots[index])
         self._registers: dict[int, int] = {}
@@ -163,11 +177,11 @@ class KilobotController:
 
     def control_step(self, tick: int, poses: Poses) -> tuple[float, float]:
         """As `Controller.control_step`. Duties are means over the quantum."""
-        self._crowd.advance(tick, poses)
+        self.crowd.advance(tick, poses)
         if tick == self._off_tick:
-            self._crowd.swarm.stop(self._index)
+            self.crowd.swarm.stop(self.index)
             self._set_leds(0, self.machine.cycle)
-        if tick >= self._off_tick or self._index in self._crowd.faults:
+        if tick >= self._off_tick or self.index in self.crowd.faults:
             return 0.0, 0.0
         changes, end = self.machine.changes, self.machine.cycle
         if not changes:
@@ -188,6 +202,11 @@ class KilobotController:
             return self._motors
         left, right = ((sum_ + duty * (end - since)) / span for sum_, duty in zip(driven, self._motors, strict=True))
         return left, right
+
+    @property
+    def has_stopped(self) -> bool:
+        """Whether the firmware has stopped after a fault."""
+        return self.index in self.crowd.faults
 
     def _take(self, change: Change) -> None:
         """Take a change of a register: a pulse of light, a byte of the UART, the LED."""
@@ -244,7 +263,7 @@ class KilobotController:
 
     def _trial_cycle(self, cycle: int) -> int:
         """Return the cycle of the trial, in Tcy of an e-puck, at a cycle of the robot's own clock."""
-        return self._crowd.swarm.tick_of(self._index, cycle) * FCY // HZ
+        return self.crowd.swarm.tick_of(self.index, cycle) * FCY // HZ
 
     def reading(self) -> Reading:
         """As `Controller.reading`. `load` is the share of cycles in which the CPU did not sleep."""
@@ -252,7 +271,7 @@ class KilobotController:
         span, asleep = cycle - self._reported[0], slept - self._reported[1]
         self._reported = (cycle, slept)
         load = 1.0 - asleep / span if span > 0 else 0.0
-        return Reading(seen=0, load=max(load, 0.0), leds=self._leds, fault=self._crowd.faults.get(self._index, ""))
+        return Reading(seen=0, load=max(load, 0.0), leds=self._leds, fault=self.crowd.faults.get(self.index, ""))
 
     def take_lines(self) -> list[SerialLine]:
         """As `Controller.take_lines`, of the debug UART."""
@@ -295,7 +314,7 @@ class KilobotController:
             f"cycle {machine.cycle:,}  SP {machine.sp:04x}  SREG {machine.peek(ADDRESSES['SREG']):02x}",
             *(f"R{n:<3} {registers[n : n + 16].hex(' ')}" for n in (0, 16)),
             *(f"{name:<24} {machine.peek(address, size)}" for address, size, name in variables[:MAX_VARIABLES]),
-            *filter(None, [self._crowd.faults.get(self._index)]),
+            *filter(None, [self.crowd.faults.get(self.index)]),
         ]
 
     def close(self) -> None:

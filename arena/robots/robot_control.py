@@ -1,4 +1,4 @@
-"""Interface through which a firmware controller runs its machine; a debugger supplies its own implementation."""
+"""Interfaces through which a controller runs its machine or crowd; a debugger supplies its own implementations."""
 
 from __future__ import annotations
 
@@ -23,3 +23,10 @@ class RobotControl(Protocol):
 
     def cuts_so_far(self) -> list[int]:
         """Return the ends of quanta that the current `run_past` has reached."""
+
+
+class CrowdControl(Protocol):
+    """Runs all Kilobots of a trial."""
+
+    def run_crowd(self, end: int) -> None:
+        """Run all robots to a tick of 1/8 MHz. May suspend the calling greenlet, and with it the trial, at any time."""

@@ -208,7 +208,7 @@ class TrialSession:
         self._require_no_failure()
         if self._running.is_over:
             raise CommandRefusedError("the trial is over")
-        if self._firmware_controller(robot).has_stopped:
+        if self._controller_for_debugger(robot).has_stopped:
             raise CommandRefusedError(f"robot {robot}: its firmware has stopped; rewind first")
         self._discard_after(self._running.world.ticks)
         self._is_detach_requested = False
@@ -457,11 +457,16 @@ class TrialSession:
             raise CommandRefusedError(f"there is no robot {robot}")
         return self._running.controllers[robot]
 
-    def _firmware_controller(self, robot: int) -> FirmwareController:
+    def _controller_for_debugger(self, robot: int) -> FirmwareController | KilobotController:
         """Return the controller of a robot with firmware. Raises CommandRefusedError for another robot."""
         controller = self._controller(robot)
+        return controller if isinstance(controller, KilobotController) else self._firmware_controller(robot)
+
+    def _firmware_controller(self, robot: int) -> FirmwareController:
+        """Return the controller of an e-puck with firmware. Raises CommandRefusedError for another robot."""
+        controller = self._controller(robot)
         if isinstance(controller, KilobotController):
-            raise CommandRefusedError(f"robot {robot} is a kilobot: breakpoints and the debugger are for e-pucks only")
+            raise CommandRefusedError(f"robot {robot} is a kilobot: attach a debugger for breakpoints")
         if not isinstance(controller, FirmwareController):
             raise CommandRefusedError(f"robot {robot} is scripted: it has no firmware")
         return controller

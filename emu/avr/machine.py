@@ -230,21 +230,22 @@ class Atmega328p:
             raise ValueError(f"{len(octets)} bytes at {address:#x} are not in the EEPROM")
         self.state.eeprom[address : address + len(octets)] = list(octets)
 
-    def _input(self, cycle: int, kind: int, value: int) -> None:
+    def give_input(self, cycle: int, kind: int, value: int) -> None:
+        """Give an input as native code takes it (core/avr.h), from a cycle on. Raises ValueError if too many wait."""
         if self._native["avr_input"](self._address, cycle, kind, value):
             raise ValueError("too many inputs wait for their cycle")
 
     def set_pins(self, cycle: int, port: int, driven: int, levels: int) -> None:
         """Drive pins of port 0 (B), 1 (C) or 2 (D) from a cycle on; bits of `driven` that are 0 float."""
-        self._input(cycle, INPUT_PIN, port << 16 | driven << 8 | levels)
+        self.give_input(cycle, INPUT_PIN, port << 16 | driven << 8 | levels)
 
     def set_analog(self, cycle: int, channel: int, microvolts: int) -> None:
         """Set the voltage of ADC channel 0 to 7, the temperature sensor (8), AIN0 (9) or AIN1 (10) from a cycle on."""
-        self._input(cycle, INPUT_ANALOG + channel, microvolts)
+        self.give_input(cycle, INPUT_ANALOG + channel, microvolts)
 
     def receive(self, cycle: int, octet: int) -> None:
         """Let the UART receive a byte whose frame ends at a cycle."""
-        self._input(cycle, INPUT_UART, octet)
+        self.give_input(cycle, INPUT_UART, octet)
 
     def snapshot(self) -> bytes:
         """Return the whole state."""

@@ -15,7 +15,7 @@ from emu.native_library import ADDRESS, INT, functions_of
 HERE: Final = Path(__file__).parent
 PARTS: Final = ("core/avr.h", "devices/timers.c", "devices/analog.c", "devices/ports.c", "devices/uart.c",
                 "devices/memories.c", "devices/system.c", "core/registers.c", "core/meanings.c", "core/boundary.c",
-                "core/waiting.c", "core/interpreter.c", "core/observed.c", "core/set_up.c")  # fmt: skip
+                "core/waiting.c", "core/interpreter.c", "core/set_up.c", "core/observed.c")  # fmt: skip
 TYPES: Final = """#include <stdint.h>
 typedef uint8_t u8;
 typedef uint16_t u16;
@@ -41,6 +41,8 @@ def native() -> dict[str, Callable[..., Any]]:
     """Return the functions of the emulator, compiled on first use. Raises HostCodeError."""
     return functions_of(source(), "avr", {
         "avr_run": (INT, (ADDRESS, ADDRESS, INT)),
-        "avr_run_observed": (INT, (ADDRESS, ADDRESS, INT, ADDRESS)), "avr_decode": (None, (ADDRESS, ADDRESS, INT, INT)),
+        "avr_run_observed": (INT, (ADDRESS, ADDRESS, INT, ADDRESS)),
+        "avr_input_observed": (INT, (ADDRESS, INT, INT, INT, ADDRESS)),
+        "avr_decode": (None, (ADDRESS, ADDRESS, INT, INT)),
         "avr_power_on": (None, (ADDRESS,)), "avr_input": (INT, (ADDRESS, INT, INT, INT)),
     })  # fmt: skip

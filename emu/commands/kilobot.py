@@ -77,9 +77,10 @@ def debugged(options: argparse.Namespace, made: Parser) -> DebuggedKilobot:
 def debugged_image(path: str, uid: int = 0, command: str = "run") -> DebuggedKilobot:
     """Return a Kilobot at power-on with an image, for the debugger. Raises LoadError."""
     from emu.avr.image import load_avr_image
+    from emu.boards.kilobot.single import SingleKilobot
     from emu.debug.avr.machine import DebuggedKilobot
 
-    return DebuggedKilobot(load_avr_image(path), uid=uid, command=command)
+    return DebuggedKilobot(SingleKilobot(load_avr_image(path), uid=uid, command=command))
 
 
 def run(options: argparse.Namespace, made: Parser) -> int:

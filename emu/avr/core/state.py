@@ -165,6 +165,7 @@ class Avr(ctypes.Structure):
     emitters: int
     lit: int
     unmodelled: int
+    light_changed: int
     skipped: int
     tracing: int
     round: int

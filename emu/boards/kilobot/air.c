@@ -8,6 +8,7 @@
 typedef i64 (*run_function)(struct avr *m, const struct insn *code, u64 until);
 typedef i64 (*observed_function)(struct avr *m, const struct insn *code, u64 until, void *observation);
 typedef i64 (*input_function)(struct avr *m, u64 at, i64 kind, i64 value);
+typedef i64 (*observed_input_function)(struct avr *m, u64 at, i64 kind, i64 value, void *observation);
 
 // MARGIN: ticks by which the last instruction may pass the goal of a robot; all light until then must be known.
 enum { ECHO = 9, MARGIN = 8 };
@@ -51,6 +52,7 @@ struct air {
     run_function run;
     input_function input;
     observed_function run_observed;
+    observed_input_function input_observed;
     u64 delay, seed, room;
     u64 lost_edges; // edges for which a receiver had no room
 };
@@ -123,6 +125,13 @@ static int add_edge(struct air *a, struct robot *r, struct edge edge)
     return 1;
 }
 
+// Give a robot an input at its cycle `at`. Return 0, or -1 if there is no room.
+static i64 give(const struct air *a, const struct robot *r, u64 at, i64 kind, i64 value)
+{
+    return r->observation ? a->input_observed(r->avr, at, kind, value, r->observation)
+                          : a->input(r->avr, at, kind, value);
+}
+
 // Apply the edges up to tick `until` to the robot's inputs; edges of one tick are applied together. The comparator's
 // input is light or darkness. The converter's inputs keep the strength, because a conversion samples after the pulse.
 static void deliver(struct air *a, struct robot *r, u64 until)
@@ -140,11 +149,11 @@ static void deliver(struct air *a, struct robot *r, u64 until)
                 brightest = e;
         }
         if (brightest) {
-            lost |= a->input(r->avr, cycle, INPUT_ANALOG + CH_HIGH_GAIN, brightest->high_uv);
-            lost |= a->input(r->avr, cycle, INPUT_ANALOG + CH_LOW_GAIN, brightest->low_uv);
+            lost |= give(a, r, cycle, INPUT_ANALOG + CH_HIGH_GAIN, brightest->high_uv);
+            lost |= give(a, r, cycle, INPUT_ANALOG + CH_LOW_GAIN, brightest->low_uv);
         }
         if (!before != !r->lights)
-            lost |= a->input(r->avr, cycle, INPUT_ANALOG + CH_AIN0, r->lights ? LIT_UV : DARK_UV);
+            lost |= give(a, r, cycle, INPUT_ANALOG + CH_AIN0, r->lights ? LIT_UV : DARK_UV);
         a->lost_edges += lost != 0;
     }
     for (u32 n = done; n < r->edge_count; n++)

@@ -6,7 +6,8 @@ import struct
 from typing import Final
 
 from emu.avr.image import AvrImage
-from emu.avr.machine import HZ, Atmega328p
+from emu.avr.machine import HZ, Atmega328p, Change
+from emu.avr.observation import Observation
 from emu.boards.kilobot.messages import DATA_SIZE, TYPES, Message, frame
 from emu.boards.kilobot.overhead import send_frame
 from emu.boards.kilobot.swarm import KilobotSetup, KilobotSwarm
@@ -30,6 +31,21 @@ class SingleKilobot:
         self.next_command: int | None = None if command == "none" else FIRST_COMMAND
         """Tick of the controller's next message; None after the last one."""
         self._frame: Final = b"" if command == "none" else frame(Message(bytes(DATA_SIZE), TYPES[command]))
+
+    @property
+    def has_ended(self) -> bool:
+        """Whether nothing can wake the CPU any more."""
+        return bool(self.machine.state.halted) and self.next_command is None
+
+    def observe(self, observation: Observation) -> None:
+        """Run the robot instruction by instruction from now on."""
+        self.swarm.observe(0, observation)
+
+    def take_changes(self) -> list[Change]:
+        """Return the changes of watched registers since the last call."""
+        changes = self.machine.changes[:]
+        self.machine.changes.clear()
+        return changes
 
     def run_until(self, tick: int) -> None:
         """Run to a tick of 1/8 MHz, or until the observed robot stops. Raises KilobotFaultError."""

@@ -96,7 +96,8 @@ class _Air(Structure):
     """Mirror of `struct air` in air.c."""
 
     _fields_ = [("count", c_int64),
-                *((name, c_void_p) for name in ("robots", "links", "acts", "run", "input", "run_observed")),
+                *((name, c_void_p) for name in ("robots", "links", "acts", "run", "input", "run_observed",
+                                             "input_observed")),
                 *((name, c_uint64) for name in ("delay", "seed", "room", "lost_edges"))]  # fmt: skip
     lost_edges: int
 
@@ -182,7 +183,7 @@ class KilobotSwarm:
         self._air = _Air(
             count, addressof(self._robots), addressof(self._links), addressof(self._acts),
             address_of(functions["avr_run"]), address_of(functions["avr_input"]),
-            address_of(functions["avr_run_observed"]), delay,
+            address_of(functions["avr_run_observed"]), address_of(functions["avr_input_observed"]), delay,
             seed * 2_654_435_761 % (1 << 63) | 1, room,
         )  # fmt: skip
         self._update_links(np.arange(count))
@@ -238,6 +239,7 @@ class KilobotSwarm:
         """Run a robot instruction by instruction from now on; None: as the others. The result of a run is the same."""
         self._observed = (robot, observation)
         self._robots[robot].observation = None if observation is None else addressof(observation)
+        self._robots[robot].code = self.robots[robot].program.address
 
     @property
     def is_stopped(self) -> bool:

@@ -1,7 +1,7 @@
 """One Kilobot for the debugger: runs, steps, breakpoints, a watched range, snapshots.
 
 It has the interface of `emu.machine.machine.Machine` that the debugger uses. The robot runs instruction by instruction
-(emu/avr/core/observed.c) under an overhead controller, so every run can be repeated from a snapshot.
+(emu/avr/core/observed.c) in its surroundings: an overhead controller, or the crowd of a trial.
 """
 
 from __future__ import annotations
@@ -12,14 +12,13 @@ from ctypes import sizeof
 from dataclasses import dataclass
 from fractions import Fraction
 from types import SimpleNamespace
-from typing import Any, Final, cast
+from typing import Any, Final, Protocol, cast
 
 from emu.avr.core.addresses import ADDRESSES
 from emu.avr.core.state import DATA_BYTES, FLASH_BYTES, NEVER, RAM_START, Avr
 from emu.avr.image import AvrImage
-from emu.avr.machine import HZ, SPL, UDR0
-from emu.avr.observation import STOP_NONE, STOP_PLACE, STOP_WRITE, Observation
-from emu.boards.kilobot.single import SingleKilobot
+from emu.avr.machine import HZ, SPL, UDR0, Atmega328p, Change
+from emu.avr.observation import STOP_LIMIT, STOP_NONE, STOP_PLACE, STOP_WRITE, Observation
 from emu.boards.kilobot.swarm import KilobotFaultError
 from emu.chips.chip import Region, Sfr
 from emu.debug.avr.fault import fault_stop
@@ -34,6 +33,33 @@ ASLEEP: Final = "the CPU sleeps or has ended, and no event can wake it"
 FLASH_AT: Final = cast("Any", Avr).flash.offset
 """Offset of the flash in the state record."""
 Hook = Callable[[], Any]
+
+
+class Surroundings(Protocol):
+    """What a debugged robot runs in (`SingleKilobot`); it determines all inputs of the robot."""
+
+    @property
+    def machine(self) -> Atmega328p:
+        """The robot's microcontroller."""
+
+    @property
+    def has_ended(self) -> bool:
+        """Whether nothing can wake the CPU any more."""
+
+    def observe(self, observation: Observation) -> None:
+        """Run the robot instruction by instruction from now on."""
+
+    def run_until(self, cycle: int) -> None:
+        """Run to a cycle of the robot, or until it stops. Raises KilobotFaultError."""
+
+    def take_changes(self) -> list[Change]:
+        """Return the changes of watched registers by the last run."""
+
+    def snapshot(self) -> bytes:
+        """Return the state of the robot, whose last part is that of its microcontroller, and of its inputs."""
+
+    def restore(self, snapshot: bytes) -> None:
+        """Return to the state of a snapshot. Raises ValueError for other bytes."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,7 +99,7 @@ class _Registers:
 class _Flash:
     """Program memory, and its place in a snapshot."""
 
-    def __init__(self, robot: SingleKilobot) -> None:
+    def __init__(self, robot: Surroundings) -> None:
         self._flash: Final = robot.machine.state.flash
         self.flash: Final = SimpleNamespace(nbytes=FLASH_BYTES)
         self.flash_offset: Final = len(robot.snapshot()) - sizeof(Avr) + FLASH_AT
@@ -95,17 +121,17 @@ class _Uart:
 
 
 class DebuggedKilobot:
-    """A robot at power-on. `uid` and `command` are those of `SingleKilobot`."""
+    """A robot in its surroundings."""
 
     engine: Final = "avr"
 
-    def __init__(self, image: AvrImage, *, uid: int = 0, command: str = "run") -> None:
-        self._robot: Final = SingleKilobot(image, uid=uid, command=command)
-        self._machine: Final = self._robot.machine
-        self._image: Final = image
+    def __init__(self, robot: Surroundings) -> None:
+        self._robot: Final = robot
+        self._machine: Final = robot.machine
+        self._image: Final = robot.machine.image
         self._observation: Final = Observation()
         self._hooks: Final[dict[int, list[Hook]]] = {}
-        self.image: Final = debug_image(image)
+        self.image: Final = debug_image(self._image)
         self.chip: Final = self.image.chip
         self.w: Final = _Registers(self._machine.state)
         self.program: Final = _Flash(self._robot)
@@ -115,7 +141,7 @@ class DebuggedKilobot:
         """Condition of a stop at a breakpoint while the history replays."""
         self.is_quiet = False
         """Whether the history replays: output is discarded, and hooks are not called."""
-        self._robot.swarm.observe(0, self._observation)
+        robot.observe(self._observation)
         self._machine.watch([UDR0])
 
     def processor(self) -> Processor:
@@ -170,7 +196,7 @@ class DebuggedKilobot:
                 return self._stopped("breakpoint", CHANGED)
             if seen.reason == STOP_PLACE and self._is_stop():
                 return self._stopped("breakpoint")
-            if seen.reason == STOP_NONE:
+            if seen.reason in (STOP_NONE, STOP_LIMIT):
                 break
         return None
 
@@ -180,7 +206,7 @@ class DebuggedKilobot:
         """Execute one instruction or enter an interrupt. A sleeping CPU sleeps at most to cycle `limit`."""
         self._observation.steps = 1
         stop = self._run(self.cycle + SLEEP_CYCLES if limit is None else max(limit, self.cycle + 1))
-        if stop is None and self._observation.reason == STOP_NONE:
+        if stop is None and self._observation.reason in (STOP_NONE, STOP_LIMIT):
             return self._stopped("limit", STILL_ASLEEP)
         return stop
 
@@ -188,7 +214,7 @@ class DebuggedKilobot:
         """Run to a cycle or the end of the observed run. Return the stop at a fault or at a program that has ended."""
         if self._machine.fault is not None:
             return fault_stop(self._machine)
-        if self._machine.state.halted and self._robot.next_command is None:
+        if self._robot.has_ended:
             return self._stopped("halt", ASLEEP)
         self._observation.reason = STOP_NONE
         try:
@@ -201,12 +227,10 @@ class DebuggedKilobot:
 
     def _deliver(self) -> None:
         """Give the UART's output to its listeners."""
-        changes = self._machine.changes
-        for change in () if self.is_quiet else changes:
-            if change.register == UDR0:
+        for change in self._robot.take_changes():
+            if change.register == UDR0 and not self.is_quiet:
                 for listener in self.uart[1].listeners:
                     listener(change.value, change.cycle)
-        changes.clear()
 
     def _stopped(self, reason: str, detail: str = "") -> Stop:
         return Stop(reason, self.pc, self.cycle, detail)

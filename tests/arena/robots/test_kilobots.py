@@ -225,10 +225,3 @@ def test_wrong_values_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture[
     path.write_text('name = "test"\n[[robots]]\nkind = "kilobot"\nimage = "nothing.hex"\n')
     assert main(["run", str(path), "--out", str(tmp_path / "out")]) == 2
     assert "expected an ELF or HEX file for AVR, or one of counts, edge, gradient, orbit, " in capsys.readouterr().err
-
-
-def test_a_debugger_refuses_a_kilobot(capsys: pytest.CaptureFixture[str]) -> None:
-    """The debugger supports only the e-puck's CPU; the message names the kind of the robot."""
-    needs("avr-gcc")
-    assert main(["debug", "orbit", "--robot", "0"]) == 2
-    assert "--robot 0: it has no firmware of an e-puck: it is a kilobot" in capsys.readouterr().err

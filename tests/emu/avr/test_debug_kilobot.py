@@ -8,6 +8,7 @@ from collections.abc import Callable
 import pytest
 
 from emu.avr.image import AvrImage
+from emu.boards.kilobot.single import SingleKilobot
 from emu.cli import main
 from emu.debug.avr.history import KilobotHistory
 from emu.debug.avr.machine import DebuggedKilobot
@@ -144,7 +145,7 @@ def test_a_fault_stops(build: Build, script: Script) -> None:
 
 def test_the_past_is_the_same(build: Build) -> None:
     """Seeks and steps back reach the states of the first run, also across messages of the controller."""
-    robot = DebuggedKilobot(build(PROGRAM, "-Os", "-gdwarf-2"))
+    robot = DebuggedKilobot(SingleKilobot(build(PROGRAM, "-Os", "-gdwarf-2")))
     history = KilobotHistory(robot)  # type: ignore[arg-type]
     history.advance(1_590_000)
     seen = {}
