@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from arena.trial import checkpoints
-from tests.arena.images import BEGIN
+from tests.arena.robot_programs import BEGIN
 from tests.firmware.conftest import built_once
 from tests.full_device import FULL_DEVICE, NO_FULL_DEVICE
 from toolchain.driver import driver

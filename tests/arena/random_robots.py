@@ -10,7 +10,7 @@ import random
 from collections.abc import Callable, Sequence
 from typing import Final
 
-from tests.arena.images import BEGIN
+from tests.arena.robot_programs import BEGIN
 
 LONG: Final = ("mov     PORTD, w0",)
 """Instructions that read the picture and that native code executes without Python; programs repeat them thousands of

@@ -23,7 +23,7 @@ from pettingzoo.test import parallel_api_test, parallel_seed_test
 from arena.camera.appearance import OBJECT, ROBOT
 from arena.env import SENSED, SIZE, ArenaEnv, serial_command
 from arena.scene.loader import load_scene
-from tests.arena.images import ECHO
+from tests.arena.robot_programs import ECHO
 
 ROOT = Path(__file__).resolve().parents[2]
 

@@ -20,7 +20,7 @@ from toolchain.abi.target import RETURN_ADDRESS_BYTES
 from toolchain.ir.cfg import loop_depths
 from toolchain.ir.model import Arg, ConstInt, Function, Instr, Type, size_of
 from toolchain.proof.counterexample import Counterexample, counterexample_of
-from toolchain.proof.ir.accesses import Accesses
+from toolchain.proof.ir.escape_analysis import Accesses
 from toolchain.proof.ir.evaluator import Evaluator
 from toolchain.proof.loops import Induction
 from toolchain.proof.machine_code.execution import CodeExecution

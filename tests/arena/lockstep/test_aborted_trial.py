@@ -15,7 +15,7 @@ from arena.lockstep.scheduler import LockStep
 from arena.robots.firmware_controller import FirmwareController
 from arena.scene.loader import load_scene
 from arena.world.physics import World
-from tests.arena.images import BEGIN
+from tests.arena.robot_programs import BEGIN
 
 LOOKING = f"""{BEGIN}
 1:      mov     PORTD, w0

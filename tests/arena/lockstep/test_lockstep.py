@@ -23,7 +23,7 @@ from arena.world.physics import World
 from arena.world.poses import Poses
 from emu.boards.epuck.camera.scan import LINE_PIXELS
 from emu.dspic30f.jit.engine import JitEngine
-from tests.arena.images import BEGIN
+from tests.arena.robot_programs import BEGIN
 from tests.watchdog import HANG
 
 

@@ -11,7 +11,7 @@ from arena.cli import main
 from arena.replay.page import sample_data, trial_data
 from arena.scene.loader import FCY, SceneError, load_scene
 from arena.trial.record import Trial, kind_of, read_trial
-from tests.arena.images import ECHO
+from tests.arena.robot_programs import ECHO
 
 SCENE = """name = "pair"
 [arena]

@@ -15,7 +15,7 @@ from arena.robots.firmware_controller import FirmwareController
 from arena.scene.loader import FCY, load_scene
 from arena.trial.record import Trial, read_trial
 from arena.world.physics import World
-from tests.arena.images import BEGIN, ECHO
+from tests.arena.robot_programs import BEGIN, ECHO
 from tests.watchdog import HANG
 
 ROOT = Path(__file__).resolve().parents[3]

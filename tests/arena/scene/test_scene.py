@@ -27,8 +27,8 @@ from arena.scene.schema import NAMED
 from arena.trial.record import read_trial
 from arena.world.physics import World, traits_of
 from arena.world.poses import Poses
-from tests.arena.images import BEGIN, REPEATING
 from tests.arena.reference_camera import ReferenceCamera, sensor_of
+from tests.arena.robot_programs import BEGIN, REPEATING
 
 FULL = """name = "yard"
 description = "everything a scene can have"

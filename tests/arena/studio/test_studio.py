@@ -33,7 +33,7 @@ from arena.trial import checkpoints
 from arena.trial.trial import run_trial
 from tests.arena.browser import BROWSER, needs_browser, probed
 from tests.arena.conftest import needs_fork
-from tests.arena.images import ECHO
+from tests.arena.robot_programs import ECHO
 from tests.watchdog import HANG
 
 ROOT = Path(__file__).resolve().parents[3]

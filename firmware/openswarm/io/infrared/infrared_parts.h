@@ -8,7 +8,7 @@
 
 typedef const volatile unsigned int *scan; /* raw readings of the sensors */
 
-/* ---- coder.c: Hamming (15,11), distance 3 ---- */
+/* ---- error_correction.c: Hamming (15,11), distance 3 ---- */
 enum { CODE_BITS = 15, DATA_BITS = 11, CODE_MASK = 0x7FFF };
 uint16 coder_encode(uint16 data);                 /* 11 bits to 15; any context */
 uint16 coder_decode(uint16 word, uint8 *repairs); /* 15 bits to 11; adds 1 to *repairs if one was wrong; any context */

@@ -1,5 +1,7 @@
-"""A sample of tests/fuzz/emulator/fuzz_drills.py: engines agree, every kind of access is made, and a difference is
-found."""
+"""A sample of tests/fuzz/emulator/fuzz_register_access.py.
+
+Engines agree, every kind of access is made, and a difference is found.
+"""
 
 from __future__ import annotations
 

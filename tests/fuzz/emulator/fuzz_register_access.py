@@ -1,9 +1,10 @@
 """Compare all engines on very short programs, hundreds per image, that access registers in all modes of access.
 
-`python tests/fuzz/emulator/fuzz_drills.py [--images N] [--seed S] [--seconds T] [--chip NAME] [--jobs N] [--table]`.
+    python tests/fuzz/emulator/fuzz_register_access.py [--images N] [--seed S] [--seconds T] [--chip NAME] [--table]
+
 Exits with 1 at the first difference. Every fourth seed runs on a fictitious chip unless --chip names a chip. The
 summary counts the combinations of register, read or write, byte or word, and mode of access that never occurred;
---table lists them.
+--table lists them. --jobs N uses N processes.
 """
 
 from __future__ import annotations
