@@ -15,7 +15,7 @@ from emu.commands.board_options import add_board_options, board_of, set_up
 from emu.commands.image_option import add_chip_option, image_of
 from emu.host.command import CommandError, Parser, seconds
 from emu.host.exit_status import DONE, FAULT
-from emu.host.files import atomic_text_file
+from emu.host.files import atomic_text_file, read_file
 from emu.host.sources import SourceFinder
 from emu.image.model import Image
 from emu.instruments.coverage import Counts, CoverageReport, count_executions
@@ -100,7 +100,7 @@ def _earlier(options: argparse.Namespace, image: Image) -> Counts:
     if not options.counts or not Path(options.counts).exists():
         return Counts()
     try:
-        return Counts.of(json.loads(Path(options.counts).read_text(encoding="utf-8")), image)
+        return Counts.of(json.loads(read_file(options.counts)), image)
     except ValueError as error:
         raise CommandError(f"{options.counts}: {error}") from None
 

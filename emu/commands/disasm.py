@@ -12,7 +12,7 @@ from emu.debug.disassembly import Item
 from emu.dspic30f.state.state import PC_MASK
 from emu.host.command import CommandError, Parser
 from emu.host.exit_status import DONE
-from emu.host.sources import SourceFinder
+from emu.host.sources import SourceFinder, source_lines
 from emu.image.model import Image
 from emu.instruments.disassembly import items
 
@@ -120,6 +120,6 @@ class _Sources:
             return ""
         if file not in self._files:
             found = self._finder.find(file)
-            self._files[file] = found.read_text("utf-8", "replace").splitlines() if found is not None else []
+            self._files[file] = source_lines(found) if found is not None else []
         lines = self._files[file]
         return f": {lines[line - 1].strip()}" if 0 < line <= len(lines) else ""

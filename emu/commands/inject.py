@@ -17,7 +17,7 @@ from typing import Final, TextIO
 from emu.commands.image_option import add_chip_option, image_of
 from emu.host.command import CommandError, Parser, count
 from emu.host.exit_status import DONE
-from emu.host.files import atomic_text_file
+from emu.host.files import atomic_text_file, read_file
 from emu.host.installation import install_command
 from emu.host.paths import use_cache
 from emu.image.model import Image
@@ -132,7 +132,7 @@ def _all_outcomes(image: Image, campaign: Campaign, options: argparse.Namespace)
 def _read_state(path: Path, header: dict[str, str], trials: int) -> dict[int, Outcome]:
     """Read a state file; an incomplete last line is removed."""
     try:
-        text = path.read_text(encoding="utf-8")
+        text = read_file(path).decode()
     except UnicodeDecodeError as error:
         raise CommandError(f"{path}: offset {error.start}: expected a state file of emu inject") from None
     whole = text[: text.rfind("\n") + 1]

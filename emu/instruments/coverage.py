@@ -19,6 +19,7 @@ from emu.debug.inspector import Inspector
 from emu.dspic30f.isa.codec import decode_for_execution
 from emu.dspic30f.isa.facts import flow_of
 from emu.dspic30f.isa.flow import Branch, Skip
+from emu.host.sources import source_lines
 from emu.image.model import Image
 
 if TYPE_CHECKING:
@@ -278,12 +279,12 @@ def _rate(part: int, whole: int) -> str:
 def excluded_lines(path: Path) -> set[int]:
     """Return the line numbers that comments in a source file exclude; none if the file cannot be read."""
     try:
-        text = path.read_text(encoding="utf-8", errors="replace")
+        lines = source_lines(path)
     except OSError:
         return set()
     out: set[int] = set()
     inside = False
-    for number, line in enumerate(text.splitlines(), 1):
+    for number, line in enumerate(lines, 1):
         marks = EXCLUDED.findall(line)
         inside = inside or "START" in marks
         if inside or "LINE" in marks:

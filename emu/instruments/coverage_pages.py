@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Final
 
 from emu.host.files import atomic_text_file
+from emu.host.sources import source_lines
 from emu.instruments.coverage import FileCoverage
 
 STYLE: Final = (
@@ -65,7 +66,7 @@ def _index(files: dict[str, FileCoverage], names: dict[str, str]) -> Iterator[st
 
 def _lines(one: FileCoverage, path: Path) -> Iterator[str]:
     try:
-        text = path.read_text(encoding="utf-8", errors="replace").splitlines()
+        text = source_lines(path)
     except OSError:
         text = []
     yield "<table>\n"

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Final
 
 from emu.debug.dwarf.units import debug_of
-from emu.host.sources import SourceFinder
+from emu.host.sources import SourceFinder, source_lines
 from emu.image.model import Image
 from emu.instruments.disassembly import items
 from emu.kernel_metrics.baseline import Where
@@ -50,8 +50,7 @@ class SourceLines:
     def _lines(self, file: str) -> list[str]:
         if file not in self._files:
             path = self._finder.find(file)
-            text = path.read_text(encoding="utf-8", errors="replace") if path is not None else ""
-            self._files[file] = text.splitlines()
+            self._files[file] = source_lines(path) if path is not None else []
         return self._files[file]
 
 

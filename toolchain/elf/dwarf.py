@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
+from emu.host.sources import source_lines
 from emu.image.lines import LineTable, SourceLine
 from toolchain.elf.model import Executable
 
@@ -25,7 +24,7 @@ class SourceText:
         """Return the text of a line, None if the file or the line does not exist."""
         if file not in self._files:
             try:
-                self._files[file] = Path(file).read_text("utf-8", "replace").splitlines()
+                self._files[file] = source_lines(file)
             except OSError:
                 self._files[file] = None
         text = self._files[file]

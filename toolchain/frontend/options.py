@@ -14,6 +14,7 @@ from pathlib import Path
 
 from emu.chips import chip_named
 from emu.chips.chip import Chip
+from emu.host.files import read_file
 from toolchain.device import device
 from toolchain.errors import ToolError
 from toolchain.frontend.option_table import CLANG, IGNORED, REFUSED, OptionRow, row_of
@@ -176,8 +177,8 @@ def _expand_response_files(argv: list[str], depth: int = 0) -> list[str]:
         if depth > 10:
             raise ToolError(f"response files nest too deeply at '{word}'")
         try:
-            text = Path(word[1:]).read_text()
-        except (OSError, UnicodeDecodeError) as error:
+            text = read_file(word[1:]).decode()
+        except (OSError, ValueError) as error:
             raise ToolError(f"cannot read response file '{word[1:]}': {error}") from error
         if "\0" in text:
             raise ToolError(f"response file '{word[1:]}': holds a zero byte at offset {text.index(chr(0))}")
