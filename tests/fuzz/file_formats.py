@@ -5,9 +5,10 @@ from __future__ import annotations
 import contextlib
 import io
 import json
-import os
 import random
 import shutil
+import sys
+import tomllib
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,13 +19,12 @@ from pyarrow import parquet
 
 import arena.cli
 import emu.cli
+import openswarm.cli
 import toolchain.cli
-from emu.commands.debug import machine_of
-from emu.dap.server import Server
-from emu.dap.wire import Wire
 from emu.host.exit_status import BAD_INPUT, MEANING
 from tests.fuzz.damage import mutate_json, mutate_text
 from tests.fuzz.emulator.fuzz_loader import mutate
+from tests.fuzz.protocol import conversation, converse
 
 PROGRAM = """
 #include <p30F6014A.h>
@@ -98,10 +98,45 @@ flash = 1
 """
 AVR_LOOP = b":02000000FFCF30\n:00000001FF\n"
 """An instruction of the ATmega328P that jumps to itself."""
+AVR_PROGRAM = Path(__file__).with_name("programs") / "avr.elf"
+"""Program for the ATmega328P; beside its source, because it needs a compiler for AVR."""
+SESSION = """break {}
+run
+backtrace
+info locals
+info statics
+print {}
+disassemble {}
+list
+finish
+step 3
+reverse-step
+frame 1
+"""
+"""Commands of a debug session that read all debug information: a function, an expression, and the function again."""
+ASSEMBLY = b"""        .global __reset
+        .text
+__reset:
+        mov     #__SP_init, w15
+        mov     #tbloffset(table), w1
+1:      tblrdl  [w1], w2
+        cp      w2, #10
+        bra     nz, 1b
+table:  .pword  0x123456, __reset
+        .section .ndata,data,near
+word:   .word   0x1234, word
+        .ascii  "text"
+"""
+LONGEST_RUN = 0.01
+"""Longest run of a campaign of faults, in simulated seconds."""
+KEY = b"00112233445566778899aabbccddeeff\n"
 ANNOTATIONS = b"calls main: step, *\ndepth step 40\nrecursion step 3\nthread step\n"
 NAMES = (
     "ELF listed",
     "ELF bounded",
+    "ELF debugged",
+    "ELF for AVR",
+    "ELF for AVR profiled",
     "HEX",
     "HEX for AVR",
     "scene",
@@ -113,7 +148,12 @@ NAMES = (
     "annotations",
     "archive",
     "options",
+    "assembly",
+    "object",
+    "program",
+    "key",
     "record",
+    "record continued",
     "record's head",
     "record's rows",
     "record's head drawn",
@@ -122,6 +162,7 @@ NAMES = (
     "manifest again",
     "manifest reported",
     "bundle",
+    "campaign",
     "state of faults",
     "C source",
     "protocol",
@@ -143,6 +184,8 @@ class Format:
     file: str
     command: tuple[str, ...]
     is_text: bool = True
+    session: str = ""
+    """Standard input of the command."""
     wrap: Callable[[bytes], bytes] = bytes
     """Function that returns the file with the damaged text inside. Raises ValueError or ArrowException if no file can
     contain the text."""
@@ -157,6 +200,10 @@ class Bench:
         (folder / "program.c").write_text(PROGRAM)
         self._must("toolchain", "cc", "-g", "-Os", str(folder / "program.c"), "-o", str(self.image))
         self._must("toolchain", "cc", "-c", str(folder / "program.c"), "-o", str(folder / "program.o"))
+        self._must("openswarm", "program", str(folder / "program.c"), "--version", "2", "-o", str(folder / "sent.elf"))
+        key = folder / "swarm.key"
+        key.write_bytes(KEY)
+        key.chmod(0o600)
         self._must("toolchain", "ar", "rcs", str(folder / "library.a"), str(folder / "program.o"))
         self._must("emu", "footprint", str(self.image), "--update", str(folder / "footprint.json"))
         self._must("emu", "coverage", str(self.image), "--seconds", "0.0003", "--counts", str(folder / "counts.json"))
@@ -172,6 +219,7 @@ class Bench:
         self._must("arena", "run", "clustering", *small, str(self.run))
         self._must("arena", "bundle", str(folder / "study.zip"), str(self.run))
         self.trial = parquet.read_table(self.run / "trial-0001.parquet")
+        flash = ("openswarm", "flash", "--port", "/dev/null", "--key", str(key))
         page = ("arena", "replay", "{}", "--out", str(folder / "page.html"))
         manifest = ((self.run / "manifest.json").read_bytes(), "run/manifest.json")
         self._must("toolchain", "hex", str(self.image), "-o", str(folder / "program.hex"))
@@ -179,6 +227,15 @@ class Bench:
         self.formats = (
             Format("ELF listed", elf, "listed.elf", ("emu", "disasm", "{}", "--source"), is_text=False),
             Format("ELF bounded", elf, "bounded.elf", ("toolchain", "bounds", "{}"), is_text=False),
+            Format("ELF debugged", elf, "debugged.elf",
+                   ("emu", "debug", "--tui", "{}", "--board", "none", "--seconds", "0.001", "--engine", "plain"),
+                   is_text=False, session=SESSION.format("step", "robot.speed[1]", "step")),
+            Format("ELF for AVR", AVR_PROGRAM.read_bytes(), "avr.elf",
+                   ("emu", "debug", "--tui", "{}", "--board", "kilobot", "--seconds", "0.001"),
+                   is_text=False, session=SESSION.format("add", "where", "add")),
+            Format("ELF for AVR profiled", AVR_PROGRAM.read_bytes(), "avr.elf",
+                   ("emu", "profile", "{}", "--board", "kilobot", "--seconds", "0.0005", "--lines", "5"),
+                   is_text=False),
             Format("HEX", hexed, "image.hex", ("emu", "info", "{}")),
             Format("HEX for AVR", AVR_LOOP, "avr.hex",
                    ("emu", "run", "{}", "--board", "kilobot", "--seconds", "0.0001")),
@@ -196,7 +253,15 @@ class Bench:
                    is_text=False),
             Format("options", b"-Os -g \"-DX=1\" '-DY' -Wall\n", "options",
                    ("toolchain", "cc", "@{}", "-c", str(folder / "program.c"), "-o", str(folder / "again.o"))),
+            Format("assembly", ASSEMBLY, "odd.s", ("toolchain", "as", "{}", "-o", str(folder / "odd.o"))),
+            Format("object", (folder / "program.o").read_bytes(), "object.o",
+                   ("toolchain", "ld", "{}", "-o", str(folder / "linked.elf")), is_text=False),
+            Format("program", (folder / "sent.elf").read_bytes(), "program-2.elf", (*flash[:2], "{}", *flash[2:]),
+                   is_text=False),
+            Format("key", KEY, key.name, (*flash[:2], str(folder / "sent.elf"), *flash[2:])),
             Format("record", (self.run / "trial-0001.parquet").read_bytes(), "trial-0001.parquet", page, is_text=False),
+            Format("record continued", (self.run / "trial-0001.parquet").read_bytes(), "start.parquet",
+                   ("arena", "run", "clustering", *small, str(folder / "out"), "--start", "{}"), is_text=False),
             Format("record's head", _head(self.trial), "headed.parquet", page, wrap=self._headed),
             Format("record's rows", _rows(self.trial), "rows.parquet", page, wrap=self._filled),
             Format("record's head drawn", _head(self.trial), "headed.parquet",
@@ -208,10 +273,12 @@ class Bench:
             Format("manifest reported", *manifest, ("arena", "report", str(self.run))),
             Format("bundle", (folder / "study.zip").read_bytes(), "study.zip", ("arena", "verify", "{}"),
                    is_text=False),
+            Format("campaign", CAMPAIGN, "faults.toml",
+                   ("emu", "inject", str(self.image), "--campaign", "{}", "--only", "1"), wrap=_short),
             Format("state of faults", (folder / "faults.state").read_bytes(), "again.state",
                    ("emu", "inject", str(self.image), "--campaign", str(folder / "faults.toml"), "--state", "{}")),
             Format("C source", PROGRAM.encode(), "odd.c", ("toolchain", "cc", "-c", "{}", "-o", str(folder / "odd.o"))),
-            Format("protocol", _conversation(self.image), "messages", ()),
+            Format("protocol", conversation(self.image), "messages", ()),
         )  # fmt: skip
         assert tuple(kind.name for kind in self.formats) == NAMES
 
@@ -245,7 +312,7 @@ class Bench:
             return "not made"
         shutil.rmtree(self.folder / "out", ignore_errors=True)
         try:
-            status, said = call([word.replace("{}", str(path)) for word in kind.command])
+            status, said = call([word.replace("{}", str(path)) for word in kind.command], kind.session)
         finally:
             path.write_bytes(kind.wrap(kind.sample))
         assert status in MEANING, f"status {status}"
@@ -266,21 +333,32 @@ def damaged(kind: Format, data: bytes, rng: random.Random) -> bytes:
 
 
 MAINS: dict[str, Callable[[list[str]], int]] = {
-    "emu": emu.cli.main, "arena": arena.cli.main, "toolchain": toolchain.cli.main,
+    "emu": emu.cli.main, "arena": arena.cli.main, "toolchain": toolchain.cli.main, "openswarm": openswarm.cli.main,
 }  # fmt: skip
 
 
-def call(words: Iterable[str]) -> tuple[int, str]:
-    """Run a command in this process. Return its status and its output."""
+def call(words: Iterable[str], session: str = "") -> tuple[int, str]:
+    """Run a command in this process, with `session` as its standard input. Return its status and its output."""
     program, *rest = words
     main = MAINS[program]
     said = io.StringIO()
     with contextlib.redirect_stderr(said), contextlib.redirect_stdout(said):
+        before, sys.stdin = sys.stdin, io.StringIO(session)
         try:
             status = main(rest)
         except SystemExit as ended:
             status = ended.code if isinstance(ended.code, int) else 1
+        finally:
+            sys.stdin = before
     return status, said.getvalue()
+
+
+def _short(campaign: bytes) -> bytes:
+    """Return a campaign of faults. Raises OverflowError for one whose runs are long."""
+    with contextlib.suppress(ValueError, RecursionError):
+        if float(tomllib.loads(campaign.decode()).get("run", {}).get("seconds", 0)) > LONGEST_RUN:
+            raise OverflowError
+    return campaign
 
 
 def _head(trial: pyarrow.Table) -> bytes:
@@ -299,58 +377,3 @@ def _parquet(table: pyarrow.Table) -> bytes:
     sink = io.BytesIO()
     parquet.write_table(table, sink)
     return sink.getvalue()
-
-
-def _conversation(image: Path) -> bytes:
-    """Return the requests of a whole debug session: only the bodies, one per line, so that damage does not affect the
-    framing."""
-    source = str(image.with_suffix(".c"))
-    asked = [
-        ("initialize", {"adapterID": "x", "linesStartAt1": True}),
-        ("launch", {"program": str(image), "stopOnEntry": True, "board": "none"}),
-        ("setBreakpoints", {"source": {"path": source}, "breakpoints": [
-            {"line": 4, "condition": "by == 3", "hitCondition": ">2"}]}),
-        ("setFunctionBreakpoints", {"breakpoints": [{"name": "step"}]}),
-        ("setInstructionBreakpoints", {"breakpoints": [{"instructionReference": "0x200", "offset": 2}]}),
-        ("setDataBreakpoints", {"breakpoints": [{"dataId": "2048:2", "accessType": "write"}]}),
-        ("configurationDone", {}),
-        ("threads", {}),
-        ("stackTrace", {"threadId": 1, "startFrame": 0, "levels": 20}),
-        ("scopes", {"frameId": 1}),
-        ("variables", {"variablesReference": 1, "start": 0, "count": 5}),
-        ("evaluate", {"expression": "robot.speed[1] + 3 * W0", "frameId": 1, "context": "watch"}),
-        ("evaluate", {"expression": "/goto 20", "context": "repl"}),
-        ("setVariable", {"variablesReference": 1, "name": "robot", "value": "3"}),
-        ("setExpression", {"expression": "robot.total", "value": "0x7fff"}),
-        ("readMemory", {"memoryReference": "0x800", "offset": -2, "count": 64}),
-        ("writeMemory", {"memoryReference": "0x900", "data": "AAEC"}),
-        ("disassemble", {"memoryReference": "0x200", "instructionOffset": -4, "instructionCount": 16}),
-        ("stepIn", {"threadId": 1, "granularity": "instruction"}),
-        ("stepBack", {"threadId": 1}),
-        ("dataBreakpointInfo", {"name": "robot", "variablesReference": 1}),
-        ("breakpointLocations", {"source": {"path": source}, "line": 1, "endLine": 30}),
-        ("exceptionInfo", {"threadId": 1}),
-        ("disconnect", {"terminateDebuggee": True}),
-    ]  # fmt: skip
-    lines = [
-        json.dumps({"seq": number, "type": "request", "command": command, "arguments": arguments})
-        for number, (command, arguments) in enumerate(asked, start=1)
-    ]
-    return "\n".join(lines).encode()
-
-
-def converse(data: bytes) -> str:
-    """Send every line as a message to a server, which must respond until the connection ends."""
-    reading, writing = os.pipe()
-    written = io.BytesIO()
-    wire = Wire(reading, written)
-    try:
-        with os.fdopen(writing, "wb") as sender, contextlib.suppress(BrokenPipeError):
-            for line in data.split(b"\n"):
-                sender.write(b"Content-Length: %d\r\n\r\n%s" % (len(line), line))
-        Server(wire, machine_of).serve()
-    finally:
-        wire.close()
-        os.close(reading)
-    assert b"Traceback" not in written.getvalue()
-    return "answered"

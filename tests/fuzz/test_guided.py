@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import importlib.util
+import random
 from pathlib import Path
 
 import pytest
 
 from tests.fuzz.emulator import fuzz_guided
-from tests.fuzz.file_formats import NAMES
+from tests.fuzz.file_formats import NAMES, Bench
 from tests.fuzz.seeds import base_seed
 
 KIND = "HEX for AVR"
@@ -36,14 +37,35 @@ def test_a_corpus_is_stored_as_equal_bytes(tmp_path: Path, monkeypatch: pytest.M
     assert (tmp_path / "corpus" / "a-kind.zip").read_bytes() == stored
 
 
-def test_corpora_are_small_inputs_of_known_kinds(tmp_path: Path) -> None:
-    stored = {path.name for path in fuzz_guided.CORPUS.iterdir()}
-    kinds = [name for name in NAMES if f"{name.replace(' ', '-')}.zip" in stored]
-    assert len(kinds) == len(stored) > 0
-    for number, name in enumerate(kinds):
-        folder = tmp_path / str(number)
-        fuzz_guided.unpack(name, folder)
-        assert 0 < max(path.stat().st_size for path in folder.iterdir()) <= fuzz_guided.LARGEST
+def test_every_kind_of_file_has_a_small_corpus() -> None:
+    assert {fuzz_guided.archive_of(name) for name in NAMES} == set(fuzz_guided.CORPUS.iterdir())
+    for name in NAMES:
+        assert 0 < fuzz_guided.archive_of(name).stat().st_size <= fuzz_guided.MOST_STORED
+        assert 0 < max(map(len, fuzz_guided.stored_inputs(name))) <= fuzz_guided.LARGEST
+
+
+def test_a_corpus_has_a_limit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The shortest inputs are stored."""
+    monkeypatch.setattr(fuzz_guided, "CORPUS", tmp_path / "corpus")
+    (tmp_path / "found").mkdir()
+    rng = random.Random(1)
+    for number in range(1, 21):
+        (tmp_path / "found" / str(number)).write_bytes(rng.randbytes(100 * number))
+    kept = fuzz_guided.pack("a kind", tmp_path / "found")
+    assert 10 < kept < 20
+    assert max(map(len, fuzz_guided.stored_inputs("a kind"))) == 100 * kept
+    assert fuzz_guided.archive_of("a kind").stat().st_size <= fuzz_guided.MOST_STORED
+
+
+@pytest.mark.slow
+def test_stored_inputs_end_with_a_documented_status(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Every commit tries two other inputs of each kind."""
+    bench, rng = Bench(tmp_path), random.Random(base_seed())
+    monkeypatch.chdir(tmp_path)
+    for kind in bench.formats:
+        stored = fuzz_guided.stored_inputs(kind.name)
+        for data in rng.sample(stored, min(2, len(stored))):
+            bench.attempt(kind, data)
 
 
 @pytest.mark.slow

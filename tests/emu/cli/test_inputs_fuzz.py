@@ -14,7 +14,8 @@ from emu.image.loader import load_image
 from emu.instruments.coverage import Counts
 from tests.fuzz.emulator import fuzz_loader, fuzz_run
 from tests.fuzz.emulator.fuzz_inputs import campaign
-from tests.fuzz.file_formats import call, converse
+from tests.fuzz.file_formats import call
+from tests.fuzz.protocol import converse
 from tests.watchdog import HANG
 
 HELLO = Path(__file__).with_name("hello.hex")
@@ -80,7 +81,7 @@ def test_a_request_for_more_than_there_is_is_refused(command: str, key: str) -> 
     code = (
         "import resource, sys\n"
         "resource.setrlimit(resource.RLIMIT_AS, (4 << 30, 4 << 30))\n"
-        "from tests.fuzz.file_formats import converse\n"
+        "from tests.fuzz.protocol import converse\n"
         "print(converse(sys.stdin.buffer.read()))"
     )
     ended = subprocess.run([sys.executable, "-c", code], input=asked, capture_output=True, check=False, timeout=HANG)

@@ -16,6 +16,8 @@ import subprocess
 import sys
 import tempfile
 import zipfile
+import zlib
+from itertools import accumulate
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -26,33 +28,48 @@ from tests.fuzz.seeds import SKIPPED, Campaign, parser  # noqa: E402
 CORPUS = ROOT / "tests" / "fuzz" / "corpus"
 LARGEST = 16_384
 """Maximum length of an input in bytes; the samples of records and images are shorter."""
+MOST_STORED = 12_288
+"""Maximum length of a corpus in bytes, compressed: only its shortest inputs are stored."""
+ENTRY = 104
+"""Bytes of an archive for each entry beside its data."""
 SECONDS = 4.0
 """Seconds for each kind of file, beside a start of about ten."""
-PACKAGES = ["emu", "toolchain", "arena"]
+PACKAGES = ["emu", "toolchain", "arena", "openswarm"]
 """Packages whose branches count, also of modules that a command imports."""
 STEADY = (1980, 1, 1, 0, 0, 0)
 """Time of all entries of an archive, so that equal corpora are equal files."""
 
 
+def archive_of(kind: str) -> Path:
+    """Return the path of the corpus of a kind of file, which may not exist."""
+    return CORPUS / f"{kind.replace(' ', '-')}.zip"
+
+
+def stored_inputs(kind: str) -> list[bytes]:
+    """Return the inputs in the corpus of a kind of file."""
+    if not archive_of(kind).exists():
+        return []
+    with zipfile.ZipFile(archive_of(kind)) as stored:
+        return [stored.read(name) for name in stored.namelist()]
+
+
 def unpack(kind: str, folder: Path) -> None:
     """Write the corpus of a kind of file into `folder`, one file per input."""
     folder.mkdir()
-    archive = CORPUS / f"{kind.replace(' ', '-')}.zip"
-    if archive.exists():
-        with zipfile.ZipFile(archive) as stored:
-            stored.extractall(folder)
+    for number, data in enumerate(stored_inputs(kind)):
+        (folder / f"{number:03}").write_bytes(data)
 
 
 def pack(kind: str, folder: Path) -> int:
-    """Store the inputs in `folder` as the corpus of a kind of file. Return their number."""
+    """Store the shortest inputs in `folder` as the corpus of a kind of file. Return their number."""
     CORPUS.mkdir(exist_ok=True)
-    inputs = sorted(path.read_bytes() for path in folder.iterdir())
-    with zipfile.ZipFile(
-        CORPUS / f"{kind.replace(' ', '-')}.zip", "w", zipfile.ZIP_DEFLATED, compresslevel=9
-    ) as stored:
-        for number, data in enumerate(inputs):
+    inputs = sorted((path.read_bytes() for path in folder.iterdir()), key=lambda data: (len(data), data))
+    lengths = accumulate(len(zlib.compress(data, 9)) + ENTRY for data in inputs)
+    kept = max(1, sum(length <= MOST_STORED for length in lengths))
+    with zipfile.ZipFile(archive_of(kind), "w", zipfile.ZIP_DEFLATED, compresslevel=9) as stored:
+        for number, data in enumerate(inputs[:kept]):
             stored.writestr(zipfile.ZipInfo(f"{number:03}", STEADY), data, zipfile.ZIP_DEFLATED)
-    return len(inputs)
+    return kept
 
 
 def fuzz(kind_name: str, inputs: Path, arguments: list[str]) -> None:
@@ -117,19 +134,19 @@ def explore(kind: str, seed: int, seconds: float, keep: bool) -> tuple[int, str]
 def main() -> int:
     if sys.argv[1:2] == ["--child"]:
         fuzz(sys.argv[2], Path(sys.argv[3]), sys.argv[4:])
+    from tests.fuzz.file_formats import NAMES
+
     made = parser(__doc__)
     made.add_argument("--format", metavar="NAME", help="this kind of file only")
     made.add_argument(
         "--each", type=float, default=SECONDS, metavar="S", help=f"seconds per kind (default {SECONDS:g})"
     )
     made.add_argument("--keep", action="store_true", help="store the corpus")
-    plan = Campaign(made, "kinds", 25, "kinds of files")
+    plan = Campaign(made, "kinds", len(NAMES), "kinds of files")
     options = plan.parse()
     if importlib.util.find_spec("atheris") is None:
         print("atheris is not installed (extra: test)")
         return SKIPPED
-    from tests.fuzz.file_formats import NAMES
-
     if options.format not in (None, *NAMES):
         made.error(f"--format {options.format}: expected one of {', '.join(NAMES)}")
     tried: dict[str, int] = {}

@@ -1,7 +1,8 @@
 """Damaged files of all other kinds that commands read: each command ends with a documented status and a message.
 
 `python tests/fuzz/emulator/fuzz_inputs.py [--inputs N] [--seed S] [--seconds T] [--format NAME]`; exits with 1 at the
-first input with another outcome. `tests/fuzz/file_formats.py` has the kinds of files. `fuzz_loader.py` tests the loader
+first input with another outcome. Half of them begin with the valid sample, half with an input of the corpus.
+`tests/fuzz/file_formats.py` has the kinds of files. `fuzz_loader.py` tests the loader
 alone with many more ELF and HEX files, `fuzz_asm.py` assembly; `fuzz_guided.py` finds inputs by coverage.
 """
 
@@ -20,6 +21,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[3]
 sys.path.insert(0, str(ROOT))
 
+from tests.fuzz.emulator.fuzz_guided import stored_inputs  # noqa: E402
 from tests.fuzz.file_formats import MOST_MEMORY, Bench, damaged  # noqa: E402
 from tests.fuzz.seeds import Campaign, parser  # noqa: E402
 
@@ -31,13 +33,15 @@ def campaign(seeds: Iterable[int], only: str | None = None) -> Counter[str]:
     with tempfile.TemporaryDirectory(prefix="inputs-") as name:
         bench = Bench(Path(name))
         chosen = [kind for kind in bench.formats if only in (None, kind.name)]
+        bases = {kind.name: [kind.sample, *stored_inputs(kind.name)] for kind in chosen}
         before = Path.cwd()
         os.chdir(name)
         try:
             for seed in seeds:
                 rng = random.Random(seed)
                 kind = chosen[seed % len(chosen)]
-                data = damaged(kind, kind.sample, rng)
+                base = kind.sample if rng.random() < 0.5 else rng.choice(bases[kind.name])
+                data = damaged(kind, base, rng)
                 try:
                     outcomes[f"{kind.name} {bench.attempt(kind, data)}"] += 1
                 except Exception as error:
