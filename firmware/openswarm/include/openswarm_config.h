@@ -31,6 +31,9 @@
 #ifndef SYS_ON_OVERFLOW
 #define SYS_ON_OVERFLOW SYS_STOP_SYSTEM /* after a thread's stack overflow; SYS_DROP_THREAD: ends only that thread */
 #endif
+#ifndef SYS_CHECK_LEVELS
+#define SYS_CHECK_LEVELS 0 /* 1, Cortex-M: an interrupt whose priority permits no kernel call stops the system by one */
+#endif
 #ifndef SYS_UARTS
 #define SYS_UARTS 2 /* of the robot */
 #endif

@@ -20,6 +20,22 @@ hal_pick cpu_pick; /* called by PendSV, returns the next thread; NULL: a slice h
 
 extern uint32_t main_stack_bottom[];
 
+#if SYS_CHECK_LEVELS
+void cpu_check_level(void)
+{
+    enum { NMI = 2, FIRST_INTERRUPT = 16 };
+    static bool reporting; /* the report locks, too */
+    uint32_t exception = cpu_exception();
+    uint32_t priority = exception >= FIRST_INTERRUPT ? NVIC_IPR(exception - FIRST_INTERRUPT)
+                        : exception == NMI           ? 0
+                                                     : CPU_PRIORITY_DEVICE;
+    if ((priority < CPU_PRIORITY_DEVICE || priority >= CPU_PRIORITY_SLICE) && !reporting) {
+        reporting = true;
+        Sys_Assertion_Failed("kernel call at a wrong priority, exception", (uint16)exception);
+    }
+}
+#endif
+
 static uint32_t guard_of(const void *stack)
 {
     return (((uint32_t)stack + GUARD - 1u) & ~(GUARD - 1u)) | CPU_GUARD_REGION;

@@ -21,10 +21,17 @@ enum { CPU_PRIORITY_DEVICE = 0x50, CPU_PRIORITY_SLICE = 0xF0, CPU_SLICE_MS = 10,
 extern volatile uint8_t cpu_slice_ms; /* ms left of the slice */
 extern volatile bool cpu_forced;      /* PendSV is pending for another reason */
 
+#if SYS_CHECK_LEVELS
+void cpu_check_level(void); /* stops the system if the running interrupt may not call the kernel */
+#else
+#define cpu_check_level() (void)0
+#endif
+
 /* BASEPRI_MAX only raises, and takes effect with the next instruction. */
 static HAL_INLINE hal_lock_state cpu_raise(uint32_t priority)
 {
     hal_lock_state before;
+    cpu_check_level();
     __asm__ volatile("mrs %0, basepri\n\tmsr basepri_max, %1" : "=&r"(before) : "r"(priority) : "memory");
     return before;
 }
