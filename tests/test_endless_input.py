@@ -29,6 +29,7 @@ def limit_memory() -> None:
         "toolchain hex /dev/zero",
         "toolchain ar x /dev/zero",
         "toolchain hex -",
+        "toolchain cc @/dev/zero",
     ],
 )
 def test_an_endless_file_is_one_line_and_status_2(line: str, tmp_path: Path) -> None:

@@ -101,7 +101,7 @@ def _earlier(options: argparse.Namespace, image: Image) -> Counts:
         return Counts()
     try:
         return Counts.of(json.loads(read_file(options.counts)), image)
-    except ValueError as error:
+    except (ValueError, RecursionError) as error:
         raise CommandError(f"{options.counts}: {error}") from None
 
 

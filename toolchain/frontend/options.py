@@ -179,7 +179,8 @@ def _expand_response_files(argv: list[str], depth: int = 0) -> list[str]:
         try:
             text = read_file(word[1:]).decode()
         except (OSError, ValueError) as error:
-            raise ToolError(f"cannot read response file '{word[1:]}': {error}") from error
+            reason = getattr(error, "strerror", None) or error
+            raise ToolError(f"cannot read response file '{word[1:]}': {reason}") from error
         if "\0" in text:
             raise ToolError(f"response file '{word[1:]}': holds a zero byte at offset {text.index(chr(0))}")
         try:

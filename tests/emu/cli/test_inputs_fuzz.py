@@ -103,6 +103,16 @@ def test_a_record_without_a_column_is_named(tmp_path: Path) -> None:
         Columns(tmp_path)["r0_x"]
 
 
+def test_counts_nested_too_deeply_are_refused(tmp_path: Path) -> None:
+    source, image, counts = tmp_path / "main.c", str(tmp_path / "main.elf"), tmp_path / "counts.json"
+    source.write_text("int main(void) { for (;;) { } }\n")
+    counts.write_text("[" * 100_000)
+    assert call(["toolchain", "cc", "-g", str(source), "-o", image])[0] == 0
+    status, said = call(["emu", "coverage", image, "--seconds", "0.0001", "--counts", str(counts)])
+    assert status == 2
+    assert said.startswith(f"emu coverage: {counts}: maximum recursion depth exceeded")
+
+
 def test_counts_that_are_no_numbers_are_refused() -> None:
     from emu.instruments.coverage import fingerprint
 
