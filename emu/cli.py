@@ -1,7 +1,8 @@
 """Command line `python -m emu COMMAND`: dispatches to a command and reports its errors as one line and an exit status.
 
 Input: arguments. Output: an exit status. A command is a module of `emu.commands`. It is listed in COMMANDS, imported on
-demand, and has `parser() -> Parser` and `run(options) -> int`. Output has no colours, as NO_COLOR requires.
+demand, and has `parser() -> Parser` and `run(options) -> int`. Only `emu debug --tui` has colours, at a terminal
+without NO_COLOR.
 """
 
 from __future__ import annotations

@@ -20,6 +20,7 @@ from arena.trial.record import RecordError
 from emu.dap.wire import Wire, wire_over
 from emu.host.errors import CommandParser
 from emu.host.exit_status import DONE
+from emu.prompt.appearance import has_colours
 from emu.prompt.reader import Prompt
 
 DESCRIPTION: Final = """\
@@ -74,7 +75,8 @@ def debug_trial(plan: Plan, folder: Path, options: argparse.Namespace) -> int:
                 f"arena debug: robot {options.robot} was not switched on before the end of the trial", file=sys.stderr
             )
         elif options.tui:
-            status = Prompt("arena debug", partial(RemoteServer, session)).serve({}, sys.stdin)
+            prompt = Prompt("arena debug", partial(RemoteServer, session), has_colours("auto"))
+            status = prompt.serve({}, sys.stdin)
         else:
             serve_client(session, options.port)
         session.finish()

@@ -14,6 +14,7 @@ from emu.commands import kilobot
 from emu.commands.board_options import add_board_options, board_of, set_up
 from emu.host.command import CommandError, Parser, port, seconds
 from emu.host.exit_status import BAD_INPUT, DONE
+from emu.prompt.appearance import COLOUR_CHOICES, has_colours
 
 if TYPE_CHECKING:
     from emu.dap.wire import Wire
@@ -57,6 +58,12 @@ def parser() -> Parser:
     made.add_argument("--tui", metavar="IMAGE", help="debug this ELF file in the terminal, with the options below")
     made.add_argument(
         "--seconds", metavar="S", type=seconds, help="with --tui: limit of the simulated time (for a script 60)"
+    )
+    made.add_argument(
+        "--color",
+        default="auto",
+        choices=COLOUR_CHOICES,
+        help="with --tui: colours; auto: at a terminal, unless NO_COLOR is set (default auto)",
     )
     made.add_argument("--engine", default="auto", help="auto, jit or plain (default auto)")
     made.add_argument(
@@ -110,7 +117,9 @@ def _run_prompt(options: argparse.Namespace) -> int:
     if limit is not None:
         _limit_time(machine, limit)
     try:
-        return Prompt("emu debug", lambda client: Server(client, lambda _launch: machine, _record)).serve({}, sys.stdin)
+        colours = has_colours(options.color)
+        prompt = Prompt("emu debug", lambda client: Server(client, lambda _launch: machine, _record), colours)
+        return prompt.serve({}, sys.stdin)
     except TimeLimitReached as error:
         sys.stdout.flush()
         raise CommandError(str(error)) from None
@@ -142,7 +151,7 @@ def _limit_time(machine: Machine, limit: Fraction) -> None:
 def _refuse_options_of_the_prompt(options: argparse.Namespace) -> None:
     """Raise CommandError for a command-line option that an editor sets in its launch configuration."""
     made = parser()
-    for name in ("engine", "strict", "seconds", "board", "crystal", "selector", "camera", "sensor", "stimulus",
+    for name in ("color", "engine", "strict", "seconds", "board", "crystal", "selector", "camera", "sensor", "stimulus",
                  *kilobot.OWN):  # fmt: skip
         if getattr(options, name) != made.get_default(name):
             raise CommandError(f"--{name} needs --tui; for an editor, set `{name}` in the launch configuration")

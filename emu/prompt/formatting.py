@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import base64
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any, Final
 
+from emu.host.sources import source_lines
+from emu.prompt.appearance import COLUMNS
 from emu.prompt.client import CommandRefusedError, Row
 
-PER_ROW: Final = 8
-"""Number of registers or memory units per line."""
+PER_ROW: Final = 4
+"""Number of registers per line."""
 ROW_BYTES: Final = 16
 INTEGER: Final = re.compile(r"0x[0-9a-fA-F]+|-?\d+")
 FORMATS: Final = "xdutca"
@@ -35,7 +37,7 @@ def backtrace(frames: Sequence[Row], at: int) -> str:
 def source(path: str, first: int, last: int, here: int = 0) -> str:
     """Return numbered lines of a file and mark line `here`. Raises CommandRefusedError if there are none."""
     try:
-        lines = Path(path).read_text(encoding="utf-8", errors="replace").splitlines()
+        lines = source_lines(path)
     except OSError as error:
         raise CommandRefusedError(f"{path}: {error.strerror}") from None
     first = max(first, 1)
@@ -69,7 +71,7 @@ def number(text: str, form: str) -> str:
 
 
 def registers(rows: Sequence[Row]) -> str:
-    """Return the working registers, eight per line, then the other registers."""
+    """Return the working registers, four per line, then the other registers."""
     digits = {"uint8": 4, "uint16": 6}
     texts = [(one["name"], f"{int(one['value']):#0{digits.get(one.get('type', ''), 6)}x}" if one["value"].isdecimal()
               else one["value"]) for one in rows]  # fmt: skip
@@ -100,18 +102,22 @@ def sfrs(groups: Sequence[Row], requested: str) -> str:
 
 
 def memory(row: Row, size: int, form: str) -> str:
-    """Return memory as units of `size` bytes, 16 bytes per line; with form "s" as a string."""
+    """Return memory as units of `size` bytes, at most 16 bytes per line; with form "s" as a string."""
     data = base64.b64decode(row.get("data", ""))
     address = int(row["address"], 16)
     if form == "s":
         return f"{address:#06x}: {data.partition(bytes(1))[0].decode('latin-1')!r}"
 
-    def units(at: int) -> Iterator[str]:
-        for location in range(at, min(at + ROW_BYTES, len(data) - size + 1), size):
-            value = int.from_bytes(data[location : location + size], "little", signed=form == "d")
-            yield f"{value:#0{2 * size + 2}x}" if form in "xa" else number(str(value), form)
+    def unit(at: int) -> str:
+        value = int.from_bytes(data[at : at + size], "little", signed=form == "d")
+        return f"{value:#0{2 * size + 2}x}" if form in "xa" else number(str(value), form)
 
-    lines = [f"{address + at:#06x}: {' '.join(units(at))}" for at in range(0, len(data), ROW_BYTES)]
+    units = [unit(at) for at in range(0, len(data) - size + 1, size)]
+    width = max(map(len, units), default=0) + 1
+    per_row = next(count for count in (16, 8, 4, 2, 1) if count * size <= ROW_BYTES and 7 + count * width <= COLUMNS)
+    lines = [
+        f"{address + size * at:#06x}: {' '.join(units[at : at + per_row])}" for at in range(0, len(units), per_row)
+    ]
     if row["unreadableBytes"]:
         lines.append(f"{address + len(data):#06x}: no memory")
     return "\n".join(lines)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Final, TextIO
 from emu.host.exit_status import BAD_INPUT, DONE, FAULT
 from emu.host.paths import history
 from emu.prompt import breakpoint_commands, run_commands, state_commands  # noqa: F401  they fill the table
+from emu.prompt.appearance import Style, coloured
 from emu.prompt.client import Client, CommandRefusedError, DebugServer, Row
 from emu.prompt.command_table import TABLE, Command, find_command
 from emu.prompt.session import DebugSession
@@ -28,9 +29,10 @@ LOCATION_COMMANDS: Final = ("break", "tbreak", "until", "list", "log", "disassem
 class Prompt:
     """Prompt for the server created by `make_server`. `program` is the command's name in error messages."""
 
-    def __init__(self, program: str, make_server: Callable[[Channel], DebugServer]) -> None:
+    def __init__(self, program: str, make_server: Callable[[Channel], DebugServer], colours: bool = False) -> None:
         self._program: Final = program
         self._column = 0
+        self._has_colours: Final = colours
         self.client: Final = Client(make_server, self._print_output)
         self.session: Final = DebugSession(self.client, self._write)
 
@@ -80,7 +82,7 @@ class Prompt:
             try:
                 last = line if execute(self.session, line).repeats else ""
             except CommandRefusedError as error:
-                self._write(str(error))
+                self.session.write(str(error), "fault")
         return DONE
 
     def _print_output(self, text: str) -> None:
@@ -89,8 +91,9 @@ class Prompt:
         sys.stdout.flush()
         self._column = 0 if text.endswith("\n") else 1
 
-    def _write(self, text: str) -> None:
-        sys.stdout.write("\n" * self._column + text + "\n")
+    def _write(self, text: str, style: Style) -> None:
+        shown = coloured(text, style) if self._has_colours else text
+        sys.stdout.write("\n" * self._column + shown + "\n")
         sys.stdout.flush()
         self._column = 0
 

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from emu.prompt import formatting
+from emu.prompt.appearance import INDENT, Style, fold
 from emu.prompt.breakpoint_list import BreakpointList
 from emu.prompt.client import Client, CommandRefusedError, Row
 
@@ -15,19 +16,28 @@ LISTING_LINES: Final = 10
 
 
 class DebugSession:
-    """State on which the commands act. `write(text)` prints a line."""
+    """State on which the commands act. `print_text(text, style)` prints lines."""
 
-    def __init__(self, client: Client, write: Callable[[str], None]) -> None:
+    def __init__(self, client: Client, print_text: Callable[[str, Style], None]) -> None:
         self.client: Final = client
         self.breakpoints: Final = BreakpointList(client)
         self.at_fault = False
         """Whether the machine has stopped at a firmware fault."""
-        self.write: Final = write
+        self._print: Final = print_text
         self.frames: list[Row] = []
         self.at = 0
         self.thread = 1
         self.list_position: tuple[str, int] = ("", 0)
         self.has_run = False
+
+    def write(self, text: str, style: Style = "", indent: int = INDENT) -> None:
+        """Print text in lines of at most 80 columns. Lines that continue one are indented by `indent` columns."""
+        self._print(fold(text, indent), style)
+
+    def write_code(self, text: str) -> None:
+        """Print lines of source code or a disassembly whole. The current line begins with `>`."""
+        for line in text.split("\n"):
+            self._print(line, "here" if line.startswith(">") else "")
 
     def start(self, launch: Row) -> None:
         """Launch the debuggee, which is then paused at its entry. Raises CommandRefusedError."""
@@ -76,9 +86,9 @@ class DebugSession:
         why = " ".join([event["reason"], *(str(one.number) for one in hit)])
         text = event.get("description", "")
         if self.at_fault:
-            self.write(self.client.ask("exceptionInfo", threadId=self.thread)["description"].rstrip())
+            self.write(self.client.ask("exceptionInfo", threadId=self.thread)["description"].rstrip(), "fault")
         elif text or event["reason"] not in ("step", "goto"):
-            self.write(why + (f": {text}" if text else ""))
+            self.write(why + (f": {text}" if text else ""), "stop")
         self.show_location()
 
     def select(self, thread: int) -> None:
@@ -92,12 +102,12 @@ class DebugSession:
         if frame is None:
             self.write(self.time())
             return
-        self.write(f"{formatting.frame(frame)}, {self.time()}")
+        self.write(f"{formatting.frame(frame)}, {self.time()}", "location")
         if frame.get("source"):
             path, line = frame["source"]["path"], int(frame["line"])
             self.list_position = path, max(line - LISTING_LINES // 2, 1)
             try:
-                self.write(formatting.source(path, line, line, line))
+                self.write_code(formatting.source(path, line, line, line))
             except CommandRefusedError as missing:
                 self.write(f"({missing})")
 

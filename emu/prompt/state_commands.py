@@ -110,7 +110,7 @@ def _instructions(session: DebugSession, address: int, count: int) -> None:
     rows = session.client.ask(
         "disassemble", memoryReference=f"{address:#08x}", instructionCount=count, resolveSymbols=True
     )["instructions"]
-    session.write(formatting.disassembly(rows, session.number("PC")))
+    session.write_code(formatting.disassembly(rows, session.number("PC")))
 
 
 @command("disassemble [FUNCTION|ADDRESS [COUNT]]", "show instructions with their source lines", "dis")
@@ -153,7 +153,7 @@ def list_(session: DebugSession, text: str) -> None:
         raise CommandRefusedError("there is no source here")
     frame = session.frames[0] if session.frames else {}
     here = frame.get("line", 0) if frame.get("source", {}).get("path") == path else 0
-    session.write(formatting.source(path, first, first + LISTING_LINES - 1, here))
+    session.write_code(formatting.source(path, first, first + LISTING_LINES - 1, here))
     session.list_position = path, first + LISTING_LINES
 
 
@@ -173,6 +173,6 @@ def help_(session: DebugSession, text: str) -> None:
     width = max(len(one.usage) for one in TABLE)
     for one in requested:
         also = f" ({', '.join(one.aliases)})" if one.aliases else ""
-        session.write(f"{one.usage:<{width}}  {one.help}{also}")
+        session.write(f"{one.usage:<{width}}  {one.help}{also}", indent=width + 2)
     if not text:
         session.write("Names may be abbreviated. An empty line repeats a step. Ctrl-C pauses a running machine.")

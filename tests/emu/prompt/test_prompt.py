@@ -187,7 +187,7 @@ def test_reverse_finish_goes_to_the_call(program: str) -> None:
     history = History(machine)
     output: list[str] = []
     prompt = Prompt("test", lambda client: Server(client, lambda _launch: machine, lambda _machine: history))
-    prompt.session.write = output.append  # type: ignore[misc]
+    prompt.session.write = lambda text, *_: output.append(text)  # type: ignore[method-assign]
     prompt.session.start({})
     for line in ("break add if b == 2", "run", "next", "next", "reverse-finish"):
         execute(prompt.session, line)
@@ -242,7 +242,7 @@ def test_reverse_step_skips_interrupts(tmp_path: Path) -> None:
     assert driver.main(["-g", "-O0", str(source), "-o", str(image)]) == 0
     machine = emu.load(image)
     prompt = Prompt("test", lambda client: Server(client, lambda _launch: machine))
-    prompt.session.write = lambda _text: None  # type: ignore[misc]
+    prompt.session.write = lambda *_: None  # type: ignore[method-assign]
     prompt.session.start({})
     for line in ("break ticking.c:19 if ticks == 3", "run"):
         execute(prompt.session, line)
@@ -258,7 +258,7 @@ def test_reverse_step_skips_interrupts(tmp_path: Path) -> None:
 
 def test_names_are_completed(program: str) -> None:
     prompt = Prompt("test", lambda client: Server(client, lambda _launch: emu.load(program)))
-    prompt.session.write = lambda _text: None  # type: ignore[misc]
+    prompt.session.write = lambda *_: None  # type: ignore[method-assign]
     prompt.session.start({})
 
     def names(text: str) -> set[str]:
