@@ -82,7 +82,7 @@ def test_random_walks_restore_equal_worlds(image_of: Callable[[str], Path]) -> N
     """Random forward and backward runs restore equal worlds, by hash, and leave the record unaffected.
 
     This is a sample of the fuzz campaign; the commit determines whether its robots use cameras, infrared sensors or
-    Bluetooth.
+    messages, or are Kilobots.
     """
     tally: Counter[str] = Counter()
     walk(5, image_of, 12, tally, SWARMS[base_seed() % len(SWARMS)])
@@ -96,7 +96,7 @@ def test_other_robots_are_restored_in_the_middle_of_a_quantum(image_of: Callable
     With native code their progress would otherwise depend on which code is already compiled.
     """
     tally: Counter[str] = Counter()
-    walk(249942260, image_of, 40, tally)
+    walk(249942260, image_of, 40, tally, SWARMS[2])
     assert tally["met again"] > 20
 
 
