@@ -108,6 +108,15 @@ def test_the_debugger_serves_its_first_client_before_the_second() -> None:
         assert b"initialize" in second.recv(4096)
 
 
+def test_the_debugger_of_a_trial_serves_its_first_client_alone() -> None:
+    few = ("--robots", "1", "--objects", "1", "--robot", "0")
+    with served("arena", "debug", "clustering", *few, "--port", "0") as (port, _), connected(port) as first:
+        assert b"initialize" in answer(first, request(1, "initialize"))
+        with suppress(OSError), connected(port) as second:
+            second.sendall(request(1, "initialize"))
+        assert b"threads" in answer(first, request(2, "threads"))
+
+
 def live(folder: Path) -> list[str]:
     return ["arena", "replay", str(folder), "--live", "--port", "0"]
 
