@@ -20,9 +20,10 @@ CODES: Final[dict[Style, str]] = {"stop": "36", "location": "1", "here": "32", "
 def has_colours(choice: str) -> bool:
     """Whether output has colours for a choice of COLOUR_CHOICES.
 
-    "auto": at a terminal, unless the environment sets NO_COLOR to a text that is not empty (https://no-color.org).
+    "auto": at a terminal, unless TERM is "dumb" or NO_COLOR is set and not empty (https://no-color.org).
     """
-    return choice == "always" or (choice == "auto" and sys.stdout.isatty() and not os.environ.get("NO_COLOR"))
+    is_refused = bool(os.environ.get("NO_COLOR")) or os.environ.get("TERM") == "dumb"
+    return choice == "always" or (choice == "auto" and sys.stdout.isatty() and not is_refused)
 
 
 def coloured(text: str, style: Style) -> str:

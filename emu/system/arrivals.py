@@ -67,11 +67,8 @@ class ArrivalLog:
 
     def entries(self) -> list[list[int]]:
         """Return all entries in order: cycle, place, numbers."""
-        words = [*self._full, *self._in_memory()]
+        words = [*self._full, *self._words[self._first : self._first + self._width * self._words[LOGGED]]]
         return [words[at : at + self._width] for at in range(0, len(words), self._width)]
-
-    def _in_memory(self) -> list[int]:
-        return self._words[self._first : self._first + self._width * self._words[LOGGED]]
 
     def add(self, recording: Recording) -> None:
         """Record an arrival in the present cycle."""
@@ -80,7 +77,7 @@ class ArrivalLog:
         if recording.first is None:
             return
         if words[LOGGED] == ROOM:
-            self._full.extend(self._in_memory())
+            self._full.frombytes(memoryview(self._words).cast("B")[8 * self._first :])
             words[LOGGED] = 0
         data, at = self._record.bytes, self._first + self._width * words[LOGGED]
         numbers = [int.from_bytes(data[one.address : one.address + one.size], "little") for one in recording.numbers]

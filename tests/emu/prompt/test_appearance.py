@@ -93,8 +93,9 @@ def test_colours_mark_stops_locations_and_the_current_line(program: Path, capsys
 
 
 def test_when_output_has_colours(monkeypatch: pytest.MonkeyPatch) -> None:
-    """NO_COLOR counts if it is not empty, and `always` overrides it."""
+    """NO_COLOR counts if it is not empty. `always` overrides it, and a dumb terminal has no colours."""
     monkeypatch.delenv("NO_COLOR", raising=False)
+    monkeypatch.setenv("TERM", "xterm")
     assert not has_colours("auto")
     monkeypatch.setattr(sys, "stdout", type("Terminal", (io.StringIO,), {"isatty": lambda _self: True})())
     assert [has_colours(one) for one in ("auto", "always", "never")] == [True, True, False]
@@ -102,6 +103,9 @@ def test_when_output_has_colours(monkeypatch: pytest.MonkeyPatch) -> None:
     assert has_colours("auto")
     monkeypatch.setenv("NO_COLOR", "1")
     assert [has_colours(one) for one in ("auto", "always", "never")] == [False, True, False]
+    monkeypatch.delenv("NO_COLOR")
+    monkeypatch.setenv("TERM", "dumb")
+    assert not has_colours("auto")
 
 
 def test_the_option_of_the_command(
