@@ -4,6 +4,10 @@ from __future__ import annotations
 
 import argparse
 import math
+from typing import Final
+
+LONGEST: Final = 1e7
+"""Largest value of a duration, in the unit of its option."""
 
 
 def count(text: str) -> int:
@@ -32,7 +36,7 @@ def duration(text: str) -> float:
         value = float(text)
     except ValueError:
         value = math.nan
-    if not 0 < value <= 1e7:
+    if not 0 < value <= LONGEST:
         raise argparse.ArgumentTypeError(f"{text!r}: expected a positive number of at most 1e7")
     return value
 
