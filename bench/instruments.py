@@ -3,8 +3,8 @@
     python bench/instruments.py [--seconds S] [--repeat N] [--json]
 
 The program computes in a loop of about 500 Tcy. A hook and conditions are reached once per round, `rounds` changes once
-per round, `rare` every 256 rounds. The figure is the minimum host CPU time of N runs; the kinds alternate. Instruments
-that call Python often or write much text run a shorter time.
+per round, `rare` every 256 rounds. Each run lies between two runs without instruments; the share is the median of N
+ratios of host CPU time. Instruments that call Python often or write much text run a shorter time.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ import tempfile
 import time
 from collections.abc import Callable
 from pathlib import Path
+from statistics import median
 
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
@@ -163,18 +164,27 @@ def machine_of(image: Path) -> emu.Machine:
     return machine
 
 
-def measure(image: Path, seconds: float, repeat: int) -> dict[str, float]:
-    """Return simulated seconds per second of CPU, by instrument."""
-    best: dict[str, float] = {}
+def speed(image: Path, name: str, seconds: float) -> float:
+    """Return simulated seconds per second of CPU of one run with an instrument."""
+    run, share = RUNS[name]
+    machine = machine_of(image)
+    cycles = int(machine.hz * seconds * share)
+    run(machine, cycles // 100)
+    begun = time.process_time()
+    run(machine, cycles)
+    return cycles / float(machine.hz) / (time.process_time() - begun)
+
+
+def measure(image: Path, seconds: float, repeat: int) -> tuple[dict[str, float], dict[str, float]]:
+    """Return medians by instrument: simulated seconds per second of CPU, and share of the runs before and after."""
+    speeds: dict[str, list[float]] = {name: [] for name in RUNS}
+    shares: dict[str, list[float]] = {name: [] for name in RUNS}
     for _ in range(repeat):
-        for name, (run, share) in RUNS.items():
-            machine = machine_of(image)
-            cycles = int(machine.hz * seconds * share)
-            run(machine, cycles // 100)
-            begun = time.process_time()
-            run(machine, cycles)
-            best[name] = max(best.get(name, 0), cycles / float(machine.hz) / (time.process_time() - begun))
-    return best
+        for name in RUNS:
+            before, one, after = (speed(image, kind, seconds) for kind in ("none", name, "none"))
+            speeds[name].append(one)
+            shares[name].append(2 * one / (before + after))
+    return {name: median(found) for name, found in speeds.items()}, {k: median(found) for k, found in shares.items()}
 
 
 def main() -> None:
@@ -187,13 +197,12 @@ def main() -> None:
         source, image = Path(folder) / "p.c", Path(folder) / "p.elf"
         source.write_text(SOURCE, encoding="utf-8")
         emu.build(source, output=image)
-        found = measure(image, options.seconds, options.repeat)
-    shares = {name: speed / found["none"] for name, speed in found.items()}
+        found, shares = measure(image, options.seconds, options.repeat)
     if options.json:
         print(json.dumps({"real time": found, "share": shares}))
         return
-    for name, speed in found.items():
-        print(f"{name:36} {speed:9.3f} x real time  {shares[name]:8.4f}")
+    for name, one in found.items():
+        print(f"{name:36} {one:9.3f} x real time  {shares[name]:8.4f}")
 
 
 if __name__ == "__main__":
