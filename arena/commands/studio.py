@@ -10,10 +10,15 @@ import argparse
 import hmac
 import json
 import math
+import os
 import secrets
+import tempfile
 import webbrowser
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, nullcontext, suppress
+from html import escape
 from http.server import ThreadingHTTPServer
+from pathlib import Path
 from typing import Any, Final
 from urllib.parse import parse_qs, urlsplit
 
@@ -59,13 +64,27 @@ def run(options: argparse.Namespace) -> int:
     try:
         with server(studio, options.port) as serving:
             print(f"{serving.address} (Ctrl-C ends)", flush=True)
-            if options.open:
-                webbrowser.open(serving.address)
-            with suppress(KeyboardInterrupt):
+            with _browser(serving.address) if options.open else nullcontext(), suppress(KeyboardInterrupt):
                 serving.serve_forever()
     finally:
         studio.close()
     return 0
+
+
+@contextmanager
+def _browser(address: str) -> Iterator[None]:
+    """Open an address in the default browser, through a private file that is removed at the end.
+
+    Other users see the browser's arguments in the list of processes, so that they must not contain the token.
+    """
+    handle, name = tempfile.mkstemp(prefix="studio-", suffix=".html")
+    try:
+        with os.fdopen(handle, "w", encoding="utf-8") as file:
+            file.write(f'<!doctype html><meta http-equiv="refresh" content="0; url={escape(address)}">\n')
+        webbrowser.open(Path(name).as_uri())
+        yield
+    finally:
+        os.unlink(name)
 
 
 class StudioServer(ThreadingHTTPServer):
