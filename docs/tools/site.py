@@ -27,6 +27,8 @@ PROGRAMS = ("emu", "toolchain", "arena", "openswarm")
 LINK = re.compile(r"(\]\()([^)\s]+)(\))")
 OPTION = re.compile(r"^ {2,4}(-\S.*?)(?: {2,}(\S.*))?\n((?: {10,}\S.*\n)*)", re.MULTILINE)
 """An option in the output of `--help`: its names and arguments, the first line of its text, the other lines."""
+DIAGRAM = re.compile(r"^```\n(?=(?:(?!```).*\n)*?.*[─│└├])", re.MULTILINE)
+"""The first line of a code block without a language that contains lines drawn with characters."""
 KEYS = Path("docs/scene-keys.md")
 
 
@@ -55,7 +57,8 @@ def copy_pages(source: Path) -> None:
 
 
 def with_pages(text: str, page: Path) -> str:
-    """Return the text of a page with links to folders replaced by links to their READMEs."""
+    """Return the text of a page with links to folders replaced by links to their READMEs, and with marked diagrams."""
+    text = DIAGRAM.sub("``` { .text .diagram }\n", text)
     return LINK.sub(lambda found: found[1] + to_page(page, found[2]) + found[3], text)
 
 
@@ -125,15 +128,18 @@ def reference(source: Path) -> None:
 
 
 def all_pages(source: Path) -> str:
-    """Return a page that links to every page, by folder: each page is then two clicks from Home."""
-    lines, folder = ["# All pages\n"], None
+    """Return a page that links to every page, by top folder: each page is then two clicks from Home."""
+    lines, group = ["# All pages\n"], None
     for page in sorted(source.rglob("*.md"), key=lambda one: (one.parent, one.name)):
         place = page.relative_to(source)
-        if place.parent != folder:
-            folder = place.parent
-            lines.append(f"\n## {folder.as_posix() if folder.name else 'project'}\n")
-        heading = re.search("^# (.+)$", page.read_text(encoding="utf-8"), re.MULTILINE)
-        lines.append(f"- [{heading[1] if heading else place.name}](../{place.as_posix()})")
+        parts = place.parts[:-1]
+        heading = "/".join(parts[: 2 if parts[:1] == ("docs",) else 1]) or "project"
+        if heading != group:
+            group = heading
+            lines.append(f"\n## {heading}\n")
+        title = re.search("^# (.+)$", page.read_text(encoding="utf-8"), re.MULTILINE)
+        folder = f"`{place.parent.as_posix()}`: " if len(parts) > 1 else ""
+        lines.append(f"- {folder}[{title[1] if title else place.name}](../{place.as_posix()})")
     return "\n".join(lines) + "\n"
 
 
@@ -161,7 +167,10 @@ def main() -> int:
             wanted.out.resolve(),
         ]
         surroundings = os.environ | {"NO_MKDOCS_2_WARNING": "1"}
-        return subprocess.run([sys.executable, *map(str, words)], cwd=ROOT, env=surroundings, check=False).returncode
+        status = subprocess.run([sys.executable, *map(str, words)], cwd=ROOT, env=surroundings, check=False).returncode
+    # the page for wrong addresses names its style sheets from the server's root, where they may not be
+    (wanted.out / "404.html").unlink(missing_ok=True)
+    return status
 
 
 if __name__ == "__main__":

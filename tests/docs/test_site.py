@@ -49,8 +49,15 @@ def test_every_page_is_reached_from_home_in_three_clicks(site: Path) -> None:
         assert absent == []
         edge = sorted(found - reached)
         reached |= found
-    pages = {page for page in site.rglob("*.html") if page.name != "404.html"}
+    pages = set(site.rglob("*.html"))
     assert sorted(str(page.relative_to(site)) for page in pages - reached) == []
+
+
+@pytest.mark.slow
+def test_pages_name_their_files_relative_to_themselves(site: Path) -> None:
+    """So the site works from disk and in any folder of a server."""
+    pages = {page: page.read_text(encoding="utf-8") for page in site.rglob("*.html")}
+    assert [page for page, text in pages.items() if re.search(r'(href|src)="/', text)] == []
 
 
 @pytest.mark.slow
