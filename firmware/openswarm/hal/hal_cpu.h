@@ -73,8 +73,9 @@ typedef sys_pcb *(*hal_pick)(void); /* kernel stack, slice level; returns the th
     })
 #define HAL_STORE(place, value)                                                               \
     do {                                                                                      \
+        __typeof__(place) hal_value_ = (value); /* not under the lock: hal_in_isr() */       \
         hal_lock_state hal_lock_ = hal_lock_devices();                                        \
-        (place) = (value);                                                                    \
+        (place) = hal_value_;                                                                 \
         hal_unlock(hal_lock_);                                                                \
     } while (0)
 #endif

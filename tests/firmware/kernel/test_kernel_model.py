@@ -20,9 +20,17 @@ from tests.firmware.model.calls import CALLS
 from tests.firmware.model.compare import Kernels, build, random_programs
 from tests.firmware.model.faults import FAULTS, FOUND_BY, plant
 from tests.firmware.model.generator import MOST_CALLS, Generator
-from tests.firmware.model.on_target import DEFINES, DEFINES_IN_QEMU, Comparison, CpuInQemu, Robot
+from tests.firmware.model.on_target import (
+    DEFINES,
+    DEFINES_IN_QEMU,
+    DEFINES_OF_KILOBOT,
+    Comparison,
+    CpuInQemu,
+    KilobotCpu,
+    Robot,
+)
 from tests.firmware.model.program import Program, named_texts
-from tests.firmware.ports.targets import BOARDS, in_qemu, make
+from tests.firmware.ports.targets import BOARDS, in_qemu, kilobot, make
 from tests.fuzz.seeds import base_seed
 
 PROGRAMS = 600
@@ -178,6 +186,25 @@ def test_programs_agree_in_qemu(target: str, tmp_path: Path) -> None:
     machine = CpuInQemu(BOARDS[target], image)
     check_all(partial(check_on, machine), [*random_programs(base_seed() + 1, 15), *at_known_boundaries()])
     assert machine.compared > 20
+
+
+@pytest.mark.slow
+def test_programs_agree_on_the_kilobot(tmp_path: Path) -> None:
+    """At least 200 programs agree with the model on the Kilobot's ATmega328P, whose RAM few programs fit."""
+    image = make("kilobot", "model", tmp_path, f"DEFINES={DEFINES_OF_KILOBOT}", apps=TARGET_APPS)
+    kilobot(image).close()  # skips if simavr is missing
+    machine = KilobotCpu(image)
+    check_on(machine, Program.parse(SPEEDS_OUT_OF_RANGE))
+    seed = base_seed()
+    while machine.compared < 200:
+        check_all(partial(check_on, machine), random_programs(seed, 20))
+        seed += 1
+    assert machine.overflows < 20
+
+
+SPEEDS_OUT_OF_RANGE = """main 0: START_KERNEL(0, 0, 0); SUBSCRIBE(5, 4, 1); SEND(5, 6, 1); YIELD(0, 0, 0)
+handler 1: MOTOR_SPEEDS(0, 0, 0)"""
+"""The error of the motors' handler is that of all handlers, where a store under a lock looks like an interrupt."""
 
 
 def test_the_readme_states_every_planted_fault() -> None:

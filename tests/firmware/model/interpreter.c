@@ -17,7 +17,7 @@
 
 #include <string.h>
 
-enum { MAIN, THREADS, HANDLERS = 5, CONDITIONS = 9, CLEANUPS = 12, ISRS = 15, SCRIPTS = 18 };
+enum { MAIN, THREADS, HANDLERS = 5, CONDITIONS = 9, CLEANUPS = 12, ISRS = 15 };
 enum { KIND_MAIN, KIND_THREAD, KIND_HANDLER, KIND_CONDITION, KIND_CLEANUP, KIND_ISR, KIND_FINAL };
 enum { ENTRY = 0xFF, END = 0xFE, SLOTS = 4, SKIPPED = 0xEEEE, NOTHING = 0xFFFF };
 
@@ -37,7 +37,7 @@ const uint16 interpreter_sizes[SIZES] = {
     HEAP_STEP, sizeof(sys_pcb), sizeof(event), sizeof(subscription), sizeof(message), sizeof(periodic), SYS_DEFAULT_STACK,
     SYS_MINIMUM_STACK, SYS_SMALL_PAYLOAD, SYS_MAXIMUM_PAYLOAD, SYS_KERNEL_STACK, SYS_LOSS_COUNTERS, SYS_MAXIMUM_SPEED,
     SYS_REMOTE_EVENTS, SYS_REMOTE_MEMORY};
-static script scripts[SCRIPTS];
+static const uint8 *program_bytes; /* the scripts, one behind the other */
 static uint16 slots[SLOTS];
 static uint16 starts;
 static bool later_used; /* LATER was executed: the order of its interrupt and the call's steps is open */
@@ -46,8 +46,9 @@ static sys_event_data *results[MOST_PIDS]; /* wait result by PID */
 static const uint16 events[] = {SYS_FIRST_USER_EVENT, SYS_FIRST_USER_EVENT + 1, SYS_FIRST_USER_EVENT + 8,
                                 SYS_1ms_TIMER, SYS_EVENT_TERMINATION, SYS_LEFTMOTOR_SPEED, SYS_DEADLINE_MISSED, 0x99};
 static const uint16 sizes[] = {0, 1, 2, 3, 9, 16, 17, SYS_SMALL_PAYLOAD, SYS_SMALL_PAYLOAD + 1, 1025};
-enum { LARGEST_FIRST_BYTE = 3 };
-static uint8 counting[1025 + LARGEST_FIRST_BYTE]; /* 0, 1, 2 ...: payloads that no interrupt changes */
+enum { LARGEST_FIRST_BYTE = 3, LARGEST_PAYLOAD = SYS_SMALL_PAYLOAD + 1 };
+/* 0, 1, 2 ...: payloads that no interrupt changes. Payloads above SYS_MAXIMUM_PAYLOAD are refused unread. */
+static uint8 counting[LARGEST_PAYLOAD + LARGEST_FIRST_BYTE];
 
 static sys_mutex mutexes[] = {SYS_MUTEX(0), SYS_MUTEX(2), SYS_MUTEX(3)};
 static sys_cleanup cleanups[4];
@@ -93,7 +94,8 @@ typedef struct {
 
 static void put(const place *at, uint8 code, uint16 result, uint16 extra)
 {
-    (void)Sys_Get_SystemTime(); /* the call unlocks, so an interrupt may occur here, before the record is made */
+    /* The call unlocks the slice: a switch that was requested occurs here, as may an interrupt, before the record is made. */
+    (void)Sys_IsEventRegistered(NOTHING);
     uint16 heap = at->kind == KIND_ISR ? 0 : Sys_Get_Statistics()->heap_used;
     record r = {at->number, at->kind, at->index, code, Sys_Get_ProcessID(), result, Sys_Get_LastError(), heap, clock_now(),
                 extra};
@@ -113,10 +115,19 @@ static uint16 digest(const sys_event_data *data)
 
 static void run_script(place *at);
 
+static script script_of(uint8 number)
+{
+    const uint8 *s = program_bytes;
+    while (number-- != 0) {
+        s += 2 + *s * sizeof(operation);
+    }
+    return (script){s[0], s[1], (const operation *)(const void *)(s + 2)};
+}
+
 static bool run(uint8 kind, uint8 first, uint8 number, uint16 result, sys_event_data *data)
 {
     place at = {kind, (uint8)(first + number), 0, data};
-    uint8 answer = scripts[at.number].answer;
+    uint8 answer = script_of(at.number).answer;
     put(&at, ENTRY, result, data != NULL ? digest(data) : 0);
     run_script(&at);
     return answer == 2 && data != NULL ? data->value & 1u : answer != 0;
@@ -338,9 +349,9 @@ static uint16 execute(place *at, const operation *o, uint16 *extra)
 
 static void run_script(place *at)
 {
-    const script *s = &scripts[at->number];
-    for (; at->index < s->length; at->index++) {
-        const operation *o = &s->operations[at->index];
+    const script s = script_of(at->number);
+    for (; at->index < s.length; at->index++) {
+        const operation *o = &s.operations[at->index];
         uint16 extra = 0, result = execute(at, o, &extra);
         put(at, o->code, result, extra);
     }
@@ -349,12 +360,7 @@ static void run_script(place *at)
 
 void interpreter_load(const uint8 *program)
 {
-    for (script *s = scripts; s != scripts + SCRIPTS; s++) {
-        s->length = *program++;
-        s->answer = *program++;
-        s->operations = (const operation *)(const void *)program;
-        program += s->length * sizeof(operation);
-    }
+    program_bytes = program;
 }
 
 void interpreter_main(void)

@@ -6,11 +6,13 @@
 
 #include "openswarm.h"
 
+#ifndef MOST_PIDS
+#define MOST_PIDS 256 /* greatest PID of a thread with a wait result, plus 1 */
+#endif
 enum {
     MOST_RECORDS = 300, /* number of records after which a run ends */
     MOST_IDLES = 50,    /* number of times the kernel idles after which a run ends */
     MOST_STARTS = 40,   /* number of thread starts; further ones are skipped */
-    MOST_PIDS = 256,
     SIZES = 15
 };
 

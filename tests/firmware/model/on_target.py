@@ -1,4 +1,4 @@
-"""Runs programs on the emulated dsPIC30F and on CPUs in QEMU, whose timers are stopped.
+"""Runs programs on the emulated dsPIC30F, on CPUs in QEMU and on the Kilobot's in simavr, whose timers are stopped.
 
 The clock ticks when the kernel idles.
 """
@@ -9,6 +9,7 @@ from contextlib import closing
 from pathlib import Path
 
 import emu
+from firmware.tools.simulated.kilobot import Kilobot
 from firmware.tools.simulated.machine import Stopped, Symbols, peek, poke_words
 from firmware.tools.simulated.qemu import Board, Qemu
 from tests.firmware.model.compare import Difference, executions
@@ -22,7 +23,17 @@ DEFINES = "-U__OPTIMIZE__ -DSYS_HEAP=4400 -DSYS_DEFAULT_STACK=400"
 PATIENCE = 3_000_000
 """Tcy after which a program that has reached neither limit, of records or of idle times, has hung."""
 DEFINES_IN_QEMU = "-DSYS_DEFAULT_STACK=1024 -Wl,--wrap=hal_idle"
-HEAP, HEAP_IN_QEMU = 3500, 24_000
+DEFINES_OF_KILOBOT = (
+    "-DSYS_REPORTS=0 -DMOST_PIDS=32 -DPROGRAM_BYTES=240 -DHAL_KERNEL_STACK=330 -DSYS_DEFAULT_STACK=176 -DSYS_HEAP=510"
+    " -Wl,--wrap=hal_idle"
+)
+"""Sizes that leave 153 of 2,048 bytes for the stack of main: threads with a default stack fit twice."""
+PROGRAM_BYTES, MOST_PIDS = 240, 32
+VECTORS = {"machine_clock_due": 12, "machine_slice_due": 14, "machine_device_due": 1}
+"""By function at which the test sets a flag of the ATmega328P: the number of its vector."""
+FIRST_ARGUMENT = 24
+"""Data address of R24, whose pair with R25 has the first argument of a function."""
+HEAP, HEAP_IN_QEMU, HEAP_OF_KILOBOT = 3500, 24_000, 480
 """Heap bytes above which a program is not compared, because the model has no fragmentation."""
 OF_A_PORT = (Code.UNUSED_STACK, Code.UNUSED_KERNEL_STACK)
 """Calls whose results depend on how much of its stacks a port leaves unused."""
@@ -126,6 +137,66 @@ class CpuInQemu(Comparison):
                 raise AssertionError(f"{program}\n{stopped}") from None
             at, count = machine.symbols["records"], peek(machine, "recorded")
             return list(RECORD.iter_unpack(machine.peek_bytes(at, count * RECORD.size)))
+
+
+class KilobotCpu(Comparison):
+    """The Kilobot's CPU in simavr, which starts once per program. Raises NotInstalled.
+
+    Not compared are programs with an interrupt within a call; those with cleanups, whose script runs on the stack of
+    another script; and those that its 2 kB of RAM cannot hold.
+    """
+
+    heap = HEAP_OF_KILOBOT
+    overflows = 0
+    """Programs that a stack overflow stopped: a port with less memory has smaller stacks than they need."""
+
+    def __init__(self, image: Path) -> None:
+        self.image = image
+        with closing(self.started()) as machine:
+            sizes = (peek(machine, "interpreter_sizes", 2 * i) for i in range(len(Sizes.__dataclass_fields__)))
+            self.sizes = Sizes(*sizes)
+        self.base = self.run(Program(), 1)[0][7]
+
+    def started(self) -> Kilobot:
+        """Return a CPU that waits for its program."""
+        machine = Kilobot(self.image)
+        machine.run_to("machine_ready")
+        return machine
+
+    def difference(self, program: Program) -> Difference | None:
+        alone = Executor(program, self.sizes).run(self.base)
+        codes = {Code(operation[0]) for script in program.scripts for operation in script.operations}
+        if codes & {Code.LATER, Code.PUSH} or max(record[4] for record in alone) >= MOST_PIDS:
+            return None
+        if len(program.encoded()) > PROGRAM_BYTES:
+            return None
+        before = self.overflows
+        difference = super().difference(program)
+        return None if self.overflows > before else difference
+
+    def run(self, program: Program, most: int) -> list[Record]:
+        records: list[Record] = []
+        with closing(self.started()) as machine:
+            symbols = machine.symbols
+            due = {symbols[name]: vector for name, vector in VECTORS.items()}
+            machine.poke_bytes(symbols["program"], program.encoded())
+            idles = 0
+            while len(records) < most and idles < LIMITS["MOST_IDLES"]:
+                try:
+                    place = machine.run_to("machine_record", "__wrap_hal_idle", *due, patience=PATIENCE)
+                except Stopped as stopped:
+                    if "the firmware stopped" not in str(stopped):
+                        raise AssertionError(f"{program}\n{stopped}") from None
+                    self.overflows += 1
+                    break
+                if place == symbols["machine_record"]:
+                    at = int.from_bytes(machine.peek_bytes(FIRST_ARGUMENT, 2), "little")
+                    records.append(RECORD.unpack(machine.peek_bytes(at, RECORD.size)))
+                elif place in due:
+                    machine.interrupt(due[place])
+                else:
+                    idles += 1
+        return records
 
 
 def without_final_state(records: list[Record]) -> list[Record]:

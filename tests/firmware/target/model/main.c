@@ -3,7 +3,10 @@
 #include "../../model/interpreter.c"
 
 volatile uint16 port_sizes[SIZES]; /* for the test */
-volatile uint8 program[600];
+#ifndef PROGRAM_BYTES
+#define PROGRAM_BYTES 600
+#endif
+volatile uint8 program[PROGRAM_BYTES];
 static uint8 skipped_allocations, failing_allocations;
 static uint8 unlocks_left; /* calls of hal_unlock() until isr_at_unlock runs; 0: it does not run */
 static void (*isr_at_unlock)(void);
@@ -43,7 +46,7 @@ void machine_interrupt_at_unlock(uint8 n, void (*isr)(void))
     unlocks_left = n;
 }
 
-HAL_OUTLINE void machine_ready(void) /* the test writes the program here */
+__attribute__((noinline, used)) void machine_ready(void) /* the test writes the program here */
 {
     __asm__ volatile("" ::: "memory");
 }
