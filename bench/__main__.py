@@ -1,4 +1,4 @@
-"""Run every measurement of this folder in turn: `python -m bench`. Each script receives the arguments."""
+"""Run every measurement below this folder in turn: `python -m bench`. Each one receives the arguments."""
 
 from __future__ import annotations
 
@@ -10,9 +10,10 @@ HERE = Path(__file__).parent
 
 
 def main() -> int:
-    for script in sorted(HERE.glob("[a-z]*.py")):
-        print(f"{script.name}:", flush=True)
-        status = subprocess.run([sys.executable, str(script), *sys.argv[1:]], check=False).returncode
+    for script in sorted(HERE.glob("*/[a-z]*.py")):
+        name = f"bench.{script.parent.name}.{script.stem}"
+        print(f"{name}:", flush=True)
+        status = subprocess.run([sys.executable, "-m", name, *sys.argv[1:]], check=False).returncode
         if status:
             return status
     return 0

@@ -1,4 +1,4 @@
-/* Firmware that uses one device all the time: built with -DLINE, -DTALK, -DWIRE, -DBUS or -DDUTY (bench/devices.py). */
+/* Firmware that uses one device all the time: built with -DLINE, -DTALK, -DWIRE, -DBUS or -DDUTY (bench/emulator/devices.py). */
 #include <p30F6014A.h>
 #include <stdint.h>
 #include <stdio.h>

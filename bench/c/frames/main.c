@@ -1,4 +1,4 @@
-/* Threads whose saved frames bench/rtos.py reads: one that is preempted and one that yields, each without and with DSP
+/* Threads whose saved frames bench/kernel/rtos.py reads: one that is preempted and one that yields, each without and with DSP
  * state (SYS_DSP). */
 #include <openswarm.h>
 

@@ -1,4 +1,4 @@
-/* Configuration of FreeRTOS for the comparison with OpenSwarm (bench/rtos.py): the minimum for the measured
+/* Configuration of FreeRTOS for the comparison with OpenSwarm (bench/kernel/rtos.py): the minimum for the measured
  * functions, which are preemption with time slices, delays, deletion and queues. */
 #ifndef FREERTOS_CONFIG_H
 #define FREERTOS_CONFIG_H

@@ -1,4 +1,4 @@
-/* FreeRTOS program measured by bench/rtos.py, which selects the running tasks by writing rtos_wanted. */
+/* FreeRTOS program measured by bench/kernel/rtos.py, which selects the running tasks by writing rtos_wanted. */
 #include "FreeRTOS.h"
 #include "queue.h"
 #include "task.h"

@@ -1,4 +1,4 @@
-/* A shared event (README.md): a user turns one robot's selector, and all robots light up. Without the line marked below
+/* x A shared event (README.md): a user turns one robot's selector, and all robots light up. Without the line marked below
  * this is a program for a single robot. */
 #include <openswarm.h>
 #include <openswarm_infrared.h>
@@ -38,3 +38,7 @@ int main(void)
     Sys_Run_SystemThread();
     return 0;
 }
+/* 1 */
+/* 2 */
+/* 3 */
+/* x */

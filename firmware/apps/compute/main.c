@@ -1,4 +1,4 @@
-/* Eight threads that compute without pause and a ninth that logs over UART1: the load of bench/jit.py. */
+/* Eight threads that compute without pause and a ninth that logs over UART1: the load of bench/emulator/jit.py. */
 #include <openswarm.h>
 
 #include <stdio.h>

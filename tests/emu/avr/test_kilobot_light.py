@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from bench.kilobot_messages import PUBLISHED, PUBLISHED_SENT, built, measure
+from bench.swarm.kilobot_messages import PUBLISHED, PUBLISHED_SENT, built, measure
 from emu.avr.image import AvrImage
 from emu.avr.machine import HZ
 from emu.boards.kilobot.swarm import ADC7, KilobotFaultError, KilobotSetup, KilobotSwarm

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 import emu
-from bench.bounds import IMAGES, rows_of
+from bench.kernel.bounds import IMAGES, rows_of
 from tests.firmware.conftest import TARGET_APPS, Build
 from tests.firmware.contracts import CALL, HEADERS, callers, numbers
 from tests.firmware.kernel.test_option_headers import OTHERS

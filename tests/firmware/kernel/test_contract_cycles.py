@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 import emu
-from bench.bounds import PLAIN
+from bench.kernel.bounds import PLAIN
 from tests.firmware.conftest import TARGET_APPS, Build
 from tests.firmware.contracts import CALL, HEADERS, callers, numbers
 from tests.firmware.kernel import test_contract_bounds as bounds

@@ -1,6 +1,7 @@
 """Stacks and handlers of applications and of random programs, observed at every instruction, never exceed their bounds.
 
-Samples of `python -m bench.stacks` and tests/fuzz/compiler/fuzz_bounds.py; errors planted in the analysis are found.
+Samples of `python -m bench.kernel.stacks` and of tests/fuzz/compiler/fuzz_bounds.py; errors planted in the analysis are
+found.
 """
 
 from __future__ import annotations
@@ -10,8 +11,8 @@ from pathlib import Path
 import pytest
 
 import emu
-from bench.stack_observer import RETURN_ADDRESS, Observer
-from bench.stacks import StackRow, rows_of, table
+from bench.kernel.stack_observer import RETURN_ADDRESS, Observer
+from bench.kernel.stacks import StackRow, rows_of, table
 from tests.firmware.conftest import Build, image
 from tests.fuzz.compiler.fuzz_bounds import examine
 from toolchain.bounds import interference

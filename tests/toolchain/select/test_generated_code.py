@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from bench.codegen import GOAL_TOTAL, XC16_OS_WORDS, sizes
+from bench.compiler.codegen import GOAL_TOTAL, XC16_OS_WORDS, sizes
 from tests.toolchain.compiled import assembly, body, words
 
 SAMPLES = """
@@ -51,7 +51,7 @@ def test_primitive_functions_are_no_larger_than_xc16s() -> None:
 
 
 def test_the_public_set_is_small_at_os(tmp_path: Path) -> None:
-    """The functions of bench.codegen meet the total size goal; none is larger than XC16's or than at -O1."""
+    """The functions of bench.compiler.codegen meet the total size goal; none is larger than XC16's or than at -O1."""
     small, fast = sizes("-Os", tmp_path), sizes("-O1", tmp_path)
     assert sum(small[n] for n in XC16_OS_WORDS) <= GOAL_TOTAL * sum(XC16_OS_WORDS.values())
     assert [n for n, most in XC16_OS_WORDS.items() if small[n] > most] == []

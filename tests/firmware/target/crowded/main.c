@@ -1,4 +1,4 @@
-/* Puts the kernel's data structures into the worst state for each measured call (bench/bounds.py). No
+/* Puts the kernel's data structures into the worst state for each measured call (bench/kernel/bounds.py). No
  * interrupt occurs, so that calls longer than a tick are measured correctly. Each scene has the worst heap tree for
  * its call: the pieces of a layout (layouts.h) are allocated one after the other, and then the holes are
  * freed. */

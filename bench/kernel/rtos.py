@@ -1,11 +1,11 @@
 """Compare OpenSwarm on three CPUs with FreeRTOS on the same emulator and with the literature: docs/table2.md.
 
-    python bench/rtos.py [--freertos DIR] [--page docs/table2.md] [--json]
+    python -m bench.kernel.rtos [--freertos DIR] [--page docs/table2.md] [--json]
 
 FreeRTOS is built from the user's checkout of github.com/FreeRTOS/FreeRTOS-Kernel: the official dsPIC port, compiled
 with our compiler at -Os and measured on our emulator. Without --freertos, its column shows the last measurement
-(bench/rtos.json, which names the version). simavr counts cycles of the Kilobot, QEMU instructions of the e-puck2. If a
-Debian package is missing, the last measurement is shown as well, and the package is named.
+(bench/kernel/rtos.json, which names the version). simavr counts cycles of the Kilobot, QEMU instructions of the
+e-puck2. If a Debian package is missing, the last measurement is shown as well, and the package is named.
 """
 
 from __future__ import annotations
@@ -20,21 +20,19 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-ROOT = Path(__file__).resolve().parents[1]
-sys.path.insert(0, str(ROOT))
+from emu.commands.footprint import _equation as memory_equation
+from emu.image.footprint import pieces, totals
+from emu.image.loader import load_image
+from emu.image.model import Image
+from emu.kernel_metrics.meter import Meter
+from emu.kernel_metrics.suite.latency import run_measures
+from emu.kernel_metrics.target import Target
+from firmware.tools.simulated.machine import NotInstalled
+from firmware.tools.simulated.measure import measure
 
-from emu.commands.footprint import _equation as memory_equation  # noqa: E402
-from emu.image.footprint import pieces, totals  # noqa: E402
-from emu.image.loader import load_image  # noqa: E402
-from emu.image.model import Image  # noqa: E402
-from emu.kernel_metrics.meter import Meter  # noqa: E402
-from emu.kernel_metrics.suite.latency import run_measures  # noqa: E402
-from emu.kernel_metrics.target import Target  # noqa: E402
-from firmware.tools.simulated.machine import NotInstalled  # noqa: E402
-from firmware.tools.simulated.measure import measure  # noqa: E402
-
+ROOT = Path(__file__).resolve().parents[2]
 HERE = Path(__file__).parent
-KEPT, LITERATURE, GLUE = HERE / "rtos.json", HERE / "literature.csv", HERE / "c" / "freertos"
+KEPT, LITERATURE, GLUE = HERE / "rtos.json", HERE / "literature.csv", HERE.parent / "c" / "freertos"
 PORT = Path("portable/MPLAB/PIC24_dsPIC")
 SOURCES = ("tasks.c", "list.c", "queue.c", "portable/MemMang/heap_1.c", PORT / "port.c", PORT / "portasm_dsPIC.S")
 TICK, YIELD, QUEUE = 1, 2, 3
@@ -70,7 +68,7 @@ INTRODUCTION = """\
 For readers who compare kernels: the paper's Table II with a figure in each cell. This command writes the page:
 
 ```
-python bench/rtos.py --freertos DIR --page docs/table2.md
+python -m bench.kernel.rtos --freertos DIR --page docs/table2.md
 ```
 
 ## Measured

@@ -1,8 +1,9 @@
 """Count the functions of kernel, drivers and run-time library that are proved equivalent to their IR.
 
-`python -m bench.proofs [--part NAME] [--level -Os] [--jobs N] [--json]`. Every C file of a part is compiled separately.
-The table counts its functions: proved, refuted, undecided, without loops, with loops. Exit status 1 if one is refuted.
-Ctrl-C prints the table of the files that are done and exits.
+    python -m bench.compiler.proofs [--part NAME] [--level -Os] [--jobs N] [--json]
+
+Every C file of a part is compiled separately. The table counts its functions: proved, refuted, undecided, without
+loops, with loops. Exit status 1 if one is refuted. Ctrl-C prints the table of the files that are done and exits.
 """
 
 from __future__ import annotations
@@ -17,11 +18,9 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-ROOT = Path(__file__).resolve().parents[1]
-sys.path.insert(0, str(ROOT))
+from emu.host.exit_status import DONE, FAULT
 
-from emu.host.exit_status import DONE, FAULT  # noqa: E402
-
+ROOT = Path(__file__).resolve().parents[2]
 SYSTEM = ROOT / "firmware" / "openswarm"
 PARTS = {
     "kernel": ("kernel/*.c", "option/*.c"),

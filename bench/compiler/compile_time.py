@@ -1,7 +1,9 @@
 """Measure compile time: 3,000 lines of C to ELF, the rebuild of an application, and the driver's start.
 
-`python -m bench.compile_time [--lines N] [--json]`. CPU seconds of all processes, the least of RUNS runs; goals: 1.2 s
-for 3,000 lines at -Os, 1.0 s for an application after a change of one file (`make -C firmware`).
+    python -m bench.compiler.compile_time [--lines N] [--json]
+
+CPU seconds of all processes, the least of RUNS runs; goals: 1.2 s for 3,000 lines at -Os, 1.0 s for an application
+after a change of one file (`make -C firmware`).
 """
 
 from __future__ import annotations
@@ -15,7 +17,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parents[1]
+ROOT = Path(__file__).resolve().parents[2]
 FILES = 10
 RUNS = 3
 APP = "hello"
@@ -119,7 +121,7 @@ def rebuilt(folder: Path) -> float:
 
 def main() -> int:
     """Print the figures and return exit status 0."""
-    parser = argparse.ArgumentParser(description=__doc__, epilog="example: python -m bench.compile_time --lines 3000")
+    parser = argparse.ArgumentParser(description=__doc__, epilog="example: python -m bench.compiler.compile_time")
     parser.add_argument("--lines", type=int, default=3000)
     parser.add_argument("--json", action="store_true")
     options, _ = parser.parse_known_args()

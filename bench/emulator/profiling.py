@@ -1,6 +1,6 @@
 """Measure the overhead of `emu profile` over a plain run of the same image in native code.
 
-    python bench/profiling.py [--seconds S] [--repeat N] [--only WORD] [--json]
+    python -m bench.emulator.profiling [--seconds S] [--repeat N] [--only WORD] [--json]
 
 The figure of each kind of run is the minimum host CPU time of N runs; the kinds alternate. All native code is compiled
 before the timing starts. Images: computing C, many calls, and interrupts every 100 and every 10 us (bench/c), each at
@@ -25,14 +25,12 @@ from pathlib import Path
 
 import numpy as np
 
-ROOT = Path(__file__).resolve().parents[1]
-sys.path.insert(0, str(ROOT))
+import emu
+from emu.boards.epuck.board import Epuck
+from emu.dspic30f.jit.engine import JitEngine
+from emu.profile.cycle_shares import Profiler
 
-import emu  # noqa: E402
-from emu.boards.epuck.board import Epuck  # noqa: E402
-from emu.dspic30f.jit.engine import JitEngine  # noqa: E402
-from emu.profile.cycle_shares import Profiler  # noqa: E402
-
+ROOT = Path(__file__).resolve().parents[2]
 MIPS = 14_745_600  # instruction cycles per second of an e-puck (engines.md §4.2)
 
 

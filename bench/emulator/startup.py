@@ -16,7 +16,7 @@ import tempfile
 import time
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parents[1]
+ROOT = Path(__file__).resolve().parents[2]
 IMAGE = ROOT / "tests" / "emu" / "cli" / "hello.hex"
 KERNEL = ROOT / "firmware" / "build" / "listing1" / "firmware.elf"
 CALLS = 200_000
@@ -45,7 +45,6 @@ def cold(engine: str, image: Path) -> float:
 
 def seconds_per_call(engine: str) -> float:
     """Return seconds per `run_until` of one cycle, on a machine that idles until a distant timer match."""
-    sys.path.insert(0, str(ROOT))
     from emu.image.loader import load_image
     from emu.machine.machine import Machine
 

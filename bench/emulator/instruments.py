@@ -1,6 +1,6 @@
 """Measure the speed of instruments as a share of a run without them, in native code.
 
-    python bench/instruments.py [--seconds S] [--repeat N] [--json]
+    python -m bench.emulator.instruments [--seconds S] [--repeat N] [--json]
 
 The program computes in a loop of about 500 Tcy. A hook and conditions are reached once per round, `rounds` changes once
 per round, `rare` every 256 rounds. Each run lies between two runs without instruments; the share is the median of N
@@ -13,27 +13,24 @@ import argparse
 import io
 import json
 import os
-import sys
 import tempfile
 import time
 from collections.abc import Callable
 from pathlib import Path
 from statistics import median
 
-ROOT = Path(__file__).resolve().parents[1]
-sys.path.insert(0, str(ROOT))
+import emu
+from emu.dap.breakpoints import Breakpoint
+from emu.dap.debuggee import Debuggee
+from emu.debug.history import History
+from emu.dspic30f.cycle_accounting import CycleAccounting
+from emu.dspic30f.jit.counting import CycleCounting
+from emu.dspic30f.jit.engine import JitEngine
+from emu.instruments.coverage import Counts, count_executions
+from emu.instruments.trace import Tracer
+from emu.instruments.vcd import WaveformRecorder
 
-import emu  # noqa: E402
-from emu.dap.breakpoints import Breakpoint  # noqa: E402
-from emu.dap.debuggee import Debuggee  # noqa: E402
-from emu.debug.history import History  # noqa: E402
-from emu.dspic30f.cycle_accounting import CycleAccounting  # noqa: E402
-from emu.dspic30f.jit.counting import CycleCounting  # noqa: E402
-from emu.dspic30f.jit.engine import JitEngine  # noqa: E402
-from emu.instruments.coverage import Counts, count_executions  # noqa: E402
-from emu.instruments.trace import Tracer  # noqa: E402
-from emu.instruments.vcd import WaveformRecorder  # noqa: E402
-
+ROOT = Path(__file__).resolve().parents[2]
 SOURCE = """
 #define TIMER_CONTROL (*(volatile unsigned *)0x0104)
 volatile unsigned rounds, rare; volatile long total; static int table[16];

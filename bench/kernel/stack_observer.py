@@ -13,7 +13,7 @@ from pathlib import Path
 from random import Random
 
 import emu
-from bench.structures import Structures
+from bench.kernel.structures import Structures
 from emu.boards.epuck.config import CHIPS
 from emu.system.events import NEVER
 from toolchain.bounds.interference import SECOND_STACK
@@ -45,7 +45,7 @@ class Seen:
 
     stacks, alone  bytes by stack, with and without interrupts
     handlers       cycles by handler
-    sizes          lengths of the kernel's lists at the start and the end of each handler (bench/structures.py)
+    sizes          lengths of the kernel's lists at the start and the end of each handler (bench/kernel/structures.py)
     called         functions of RARE that were called
     """
 

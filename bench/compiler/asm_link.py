@@ -1,6 +1,6 @@
 """Measure the assembler (source lines per second) and the linker (seconds for a 32,000-word image).
 
-Usage: python bench/asm_link.py [--json]
+Usage: python -m bench.compiler.asm_link [--json]
 """
 
 from __future__ import annotations
@@ -10,9 +10,6 @@ import json
 import random
 import sys
 import time
-from pathlib import Path
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from toolchain.asm.assemble import assemble
 from toolchain.elf.read import read_object

@@ -16,8 +16,6 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
-
 from arena.campaign.campaign import Plan, controllers_of
 from arena.lockstep.scheduler import LockStep
 from arena.robots.controller import Controller, ScriptedController
@@ -148,7 +146,7 @@ def proportional_share(process: int) -> int:
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__, epilog="example: python bench/arena.py --seconds 20")
+    parser = argparse.ArgumentParser(description=__doc__, epilog="example: python -m bench.swarm.arena --seconds 20")
     parser.add_argument("--seconds", type=float, default=5.0, help="simulated time of each measurement (default 5)")
     parser.add_argument("--json", action="store_true")
     options = parser.parse_args()

@@ -1,6 +1,6 @@
 """Measure the speed of one robot with its camera on and its wheels turning: `clustering` and `clustering-bare`.
 
-    python bench/clustering.py [--seconds S] [--json]
+    python -m bench.emulator.clustering [--seconds S] [--json]
 
 Prints simulated seconds per CPU second of this process under the JIT. A warm-up of one simulated second compiles the
 native code. The camera sees a red object, so every line of every frame is rendered and captured.
@@ -18,14 +18,12 @@ from pathlib import Path
 
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-
 from emu.api import Machine
 from emu.boards.epuck.board import Epuck
 from emu.dspic30f.jit.engine import JitEngine
 from emu.image.loader import load_image
 
-FIRMWARE = Path(__file__).resolve().parents[1] / "firmware"
+FIRMWARE = Path(__file__).resolve().parents[2] / "firmware"
 START = 8
 """Selector position at which the program starts without the remote control (firmware/apps/clustering)."""
 RED = (80, 0, 0)

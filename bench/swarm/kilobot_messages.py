@@ -1,6 +1,6 @@
 """Compare messages of 25 emulated and 25 real Kilobots: numbers sent, and shares received by distance (kilobot.md §5).
 
-    python bench/kilobot_messages.py [--image FILE.elf] [--seeds 1] [--seconds 161] [--json]
+    python -m bench.swarm.kilobot_messages [--image FILE.elf] [--seeds 1] [--seconds 161] [--json]
 
 Robots on a grid of 50 mm send at the maximum rate for 4,800 ticks (firmware/kilobot/programs/counts.c). `--image`
 selects the same program linked with another library. Two parameters are fitted: the share of lost pulses by distance,
@@ -13,7 +13,6 @@ import argparse
 import json
 import shutil
 import subprocess
-import sys
 import tempfile
 from pathlib import Path
 from typing import Final
@@ -21,13 +20,11 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-ROOT = Path(__file__).resolve().parents[1]
-sys.path.insert(0, str(ROOT))
+from emu.avr.image import AvrImage, load_avr_image
+from emu.boards.kilobot.overhead import broadcast
+from emu.boards.kilobot.swarm import KilobotSetup, KilobotSwarm
 
-from emu.avr.image import AvrImage, load_avr_image  # noqa: E402
-from emu.boards.kilobot.overhead import broadcast  # noqa: E402
-from emu.boards.kilobot.swarm import KilobotSetup, KilobotSwarm  # noqa: E402
-
+ROOT = Path(__file__).resolve().parents[2]
 SIDE, GAP_MM, TICKS, TICKS_PER_MESSAGE = 5, 50, 4800, 16
 PUBLISHED_SENT: Final = 298.3 / 301
 """Messages sent by a real robot as a share of the greatest number possible."""

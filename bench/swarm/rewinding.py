@@ -1,6 +1,6 @@
 """Measure time and memory of stepping a debugged swarm backwards (Linux).
 
-    python bench/rewinding.py [--minutes M] [--json]
+    python -m bench.swarm.rewinding [--minutes M] [--json]
 
 Robot 2 of `clustering` (five robots with cameras) is debugged for M simulated minutes (default 2). Wall-clock seconds
 are measured for: the first step back with the whole world and the fastest of the next ten; a run back to the previous
@@ -19,15 +19,13 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-ROOT = Path(__file__).resolve().parents[1]
-sys.path.insert(0, str(ROOT))
+from arena.campaign.campaign import Plan
+from arena.debug.trial_client import DebugSession, RemoteServer
+from arena.robots.images import image_for
+from arena.scene.loader import FCY, load_scene
+from emu.prompt.client import Client
 
-from arena.campaign.campaign import Plan  # noqa: E402
-from arena.debug.trial_client import DebugSession, RemoteServer  # noqa: E402
-from arena.robots.images import image_for  # noqa: E402
-from arena.scene.loader import FCY, load_scene  # noqa: E402
-from emu.prompt.client import Client  # noqa: E402
-
+ROOT = Path(__file__).resolve().parents[2]
 ROBOT = 2
 
 

@@ -1,6 +1,6 @@
 """Measure the speed of firmware that accesses one device all the time, as a multiple of real time.
 
-    python bench/devices.py [--seconds S] [--repeat N] [--only NAME] [--json]
+    python -m bench.emulator.devices [--seconds S] [--repeat N] [--only NAME] [--json]
 
 Each figure is the median of N runs of host CPU time. Two counts per simulated second are printed beside it:
 instructions that the interpreter executes, and exits from native code for any reason. The programs are in c/devices.c.
@@ -17,13 +17,11 @@ import tempfile
 import time
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parents[1]
-sys.path.insert(0, str(ROOT))
+import emu
+from emu.dspic30f.jit.engine import JitEngine
 
-import emu  # noqa: E402
-from emu.dspic30f.jit.engine import JitEngine  # noqa: E402
-
-SOURCE = Path(__file__).parent / "c" / "devices.c"
+ROOT = Path(__file__).resolve().parents[2]
+SOURCE = Path(__file__).parents[1] / "c" / "devices.c"
 MIPS = 14_745_600  # engines.md §4.2
 WARM_UP = 5_000_000
 """Duration of the warm-up in Tcy of simulated time."""

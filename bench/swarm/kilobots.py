@@ -1,6 +1,6 @@
 """Speed of emulated Kilobots: a swarm on a grid of 33 mm in which each robot receives from up to 20 others.
 
-    python bench/kilobots.py [--image FILE.elf] [--robots 1 10 100] [--seconds 4] [--gap 33] [--reach 82]
+    python -m bench.swarm.kilobots [--image FILE.elf] [--robots 1 10 100] [--seconds 4] [--gap 33] [--reach 82]
 
 Without an image it builds `gradient` of firmware/kilobot with avr-gcc. Robots get RUN first. Prints simulated seconds
 per second of CPU time, and the robots that one core runs in real time.
@@ -15,19 +15,17 @@ import math
 import random
 import shutil
 import subprocess
-import sys
 import tempfile
 import time
 from pathlib import Path
 from typing import Any
 
-ROOT = Path(__file__).resolve().parents[1]
-sys.path.insert(0, str(ROOT))
+from emu.avr.core.state import Avr
+from emu.avr.image import AvrImage, load_avr_image
+from emu.boards.kilobot.overhead import broadcast
+from emu.boards.kilobot.swarm import KilobotSetup, KilobotSwarm
 
-from emu.avr.core.state import Avr  # noqa: E402
-from emu.avr.image import AvrImage, load_avr_image  # noqa: E402
-from emu.boards.kilobot.overhead import broadcast  # noqa: E402
-from emu.boards.kilobot.swarm import KilobotSetup, KilobotSwarm  # noqa: E402
+ROOT = Path(__file__).resolve().parents[2]
 
 
 def measure(image: AvrImage, count: int, seconds: float, gap: float, reach: float) -> dict[str, Any]:

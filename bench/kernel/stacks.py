@@ -1,11 +1,13 @@
 """Compare bounds of every stack and interrupt handler of applications with what they use in a run: one table.
 
-`python -m bench.stacks [--app NAME] [--cycles N] [--json]`. The run begins with main, or without it with the first C
-function; stack_observer.py observes W15 at every instruction. It feeds both UARTs, delays interrupts, and requests them
-in the deepest moment of every stack. Stacks are those of main, of every thread and of the kernel; "alone" excludes what
-interrupts use of them. The cycles of a handler count if it is neither interrupted nor leads to another thread; its
-bound assumes the greatest lengths of the kernel's lists in the run. Bounds exclude refused messages and SYS_DSP threads
-if the run had none (`--without`). Exit status 1 if a measurement exceeds its bound.
+    python -m bench.kernel.stacks [--app NAME] [--cycles N] [--json]
+
+The run begins with main, or without it with the first C function; stack_observer.py observes W15 at every instruction.
+It feeds both UARTs, delays interrupts, and requests them in the deepest moment of every stack. Stacks are those of
+main, of every thread and of the kernel; "alone" excludes what interrupts use of them. The cycles of a handler count if
+it is neither interrupted nor leads to another thread; its bound assumes the greatest lengths of the kernel's lists in
+the run. Bounds exclude refused messages and SYS_DSP threads if the run had none (`--without`). Exit status 1 if a
+measurement exceeds its bound.
 """
 
 from __future__ import annotations
@@ -19,16 +21,14 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parents[1]
-sys.path.insert(0, str(ROOT))
+from bench.kernel.bounds import build
+from bench.kernel.stack_observer import RARE, RETURN_ADDRESS, Observer
+from toolchain.bounds.interference import BoundsReport, report_of
+from toolchain.bounds.program import Program
+from toolchain.bounds.report import BoundAnalysis
+from toolchain.elf.read import read_executable
 
-from bench.bounds import build  # noqa: E402
-from bench.stack_observer import RARE, RETURN_ADDRESS, Observer  # noqa: E402
-from toolchain.bounds.interference import BoundsReport, report_of  # noqa: E402
-from toolchain.bounds.program import Program  # noqa: E402
-from toolchain.bounds.report import BoundAnalysis  # noqa: E402
-from toolchain.elf.read import read_executable  # noqa: E402
-
+ROOT = Path(__file__).resolve().parents[2]
 APPS = ROOT / "firmware" / "apps"
 VALUES = {"n": 12, "m": 40, "b": 12, "s": 12, "q": 40, "i": 0, "u": 600, "d": 120, "k": 600, "w": 2}
 VALUES |= {"l": 4, "c": 4, "y": 4, "v": 4, "r": 4}

@@ -1,12 +1,13 @@
 """Compare bounds of kernel calls with the longest observed runs: one table.
 
-`python -m bench.bounds [--image NAME] [--times X] [--json]`. Each call is bounded and measured in the same image. The
-bound assumes the maximum numbers of threads, events, subscriptions, messages and holes during the longest run of that
-call; --json lists them. A run is measured like a bound, from the first instruction to the one after the return. Runs
-with an interrupt or a thread switch do not count. A thread that ends itself does not return but continues in the
-scheduler: `end_thread` has a row for that case, and the row of `Sys_Kill_Process` is for other threads. The column
-"plain" excludes paths on which memory is short, the reserve is swapped, a free run of a handler is pending, or the call
-is refused; the other column includes them.
+    python -m bench.kernel.bounds [--image NAME] [--times X] [--json]
+
+Each call is bounded and measured in the same image. The bound assumes the maximum numbers of threads, events,
+subscriptions, messages and holes during the longest run of that call; --json lists them. A run is measured like a
+bound, from the first instruction to the one after the return. Runs with an interrupt or a thread switch do not count. A
+thread that ends itself does not return but continues in the scheduler: `end_thread` has a row for that case, and the
+row of `Sys_Kill_Process` is for other threads. The column "plain" excludes paths on which memory is short, the reserve
+is swapped, a free run of a handler is pending, or the call is refused; the other column includes them.
 """
 
 from __future__ import annotations
@@ -20,15 +21,13 @@ from collections.abc import Callable
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parents[1]
-sys.path.insert(0, str(ROOT))
+import emu
+from bench.kernel.structures import Structures
+from toolchain.bounds.program import Program
+from toolchain.bounds.report import BoundAnalysis
+from toolchain.elf.read import read_executable
 
-import emu  # noqa: E402
-from bench.structures import Structures  # noqa: E402
-from toolchain.bounds.program import Program  # noqa: E402
-from toolchain.bounds.report import BoundAnalysis  # noqa: E402
-from toolchain.elf.read import read_executable  # noqa: E402
-
+ROOT = Path(__file__).resolve().parents[2]
 EXCLUDED = ("refuse_message", "os_fail", "os_refuse")
 """Functions that are called only on paths excluded from the column "plain"."""
 PLAIN = {"x": 0, "j": 0}

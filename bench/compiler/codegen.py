@@ -1,8 +1,10 @@
 """Measure code quality: words and cycles of reference functions, and XC16's words where they are known.
 
-`python -m bench.codegen [--level=-Os] [--json]`. Words are those of the function with its return, without the run-time
-helpers that it calls. Cycles are from entry to return of one call on the emulator, helpers included. XC16's words are
-from abi-elf.md §8.2 (verified output of v1.25, -Os).
+    python -m bench.compiler.codegen [--level=-Os] [--json]
+
+Words are those of the function with its return, without the run-time helpers that it calls. Cycles are from entry to
+return of one call on the emulator, helpers included. XC16's words are from abi-elf.md §8.2 (verified output of v1.25,
+-Os).
 """
 
 from __future__ import annotations
@@ -15,13 +17,11 @@ from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parents[1]
-sys.path.insert(0, str(ROOT))
+import emu
+from toolchain.driver import driver
+from toolchain.elf.read import read_object
 
-import emu  # noqa: E402
-from toolchain.driver import driver  # noqa: E402
-from toolchain.elf.read import read_object  # noqa: E402
-
+ROOT = Path(__file__).resolve().parents[2]
 SOURCES = Path(__file__).parent / "codegen_src"
 
 XC16_OS_WORDS = {
@@ -99,7 +99,7 @@ def measure(level: str) -> list[Figure]:
 
 def main() -> int:
     """Print the table and return exit status 0."""
-    parser = argparse.ArgumentParser(description=__doc__, epilog="example: python -m bench.codegen --level=-O2")
+    parser = argparse.ArgumentParser(description=__doc__, epilog="example: python -m bench.compiler.codegen")
     parser.add_argument("--level", default="-Os")
     parser.add_argument("--json", action="store_true")
     options, _ = parser.parse_known_args()

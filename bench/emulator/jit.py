@@ -1,6 +1,6 @@
 """Measure the speed of native code: C that computes, busy threads, an interrupt storm; compared with simavr and QEMU.
 
-    python bench/jit.py [--seconds S] [--repeat N] [--json]
+    python -m bench.emulator.jit [--seconds S] [--repeat N] [--json]
 
 Each figure is the median of N paired runs and counts host CPU time, as a multiple of real time (14.7456 MIPS). The
 interpreter runs the same image for a shorter time. simavr and qemu-system-avr run the same C source, compiled by
@@ -23,13 +23,11 @@ import time
 from pathlib import Path
 from typing import Any
 
-ROOT = Path(__file__).resolve().parents[1]
-sys.path.insert(0, str(ROOT))
+import emu
+from emu.dspic30f.jit.engine import JitEngine
 
-import emu  # noqa: E402
-from emu.dspic30f.jit.engine import JitEngine  # noqa: E402
-
-HERE = Path(__file__).parent
+ROOT = Path(__file__).resolve().parents[2]
+SOURCES = Path(__file__).parents[1] / "c"
 MIPS = 14_745_600  # engines.md §4.2
 WARM_UP = {"jit": 3_000_000_000, "plain": 1_000_000}
 """Tcy before a measurement: native code until its hot regions are compiled again (emu/dspic30f/jit/hot_regions.py)."""
@@ -125,7 +123,7 @@ def avr_image(folder: Path, rounds: int) -> Path:
             "-Os",
             "-fno-lto",
             f"-DROUNDS={rounds}",
-            str(HERE / "c" / "compute_avr.c"),
+            str(SOURCES / "compute_avr.c"),
             "-o",
             str(output),
         ],
@@ -181,9 +179,9 @@ def main() -> int:
     report: dict[str, Any] = {}
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        build(HERE / "c" / "compute.c", folder / "compute.elf", "-DROUNDS=65000")
-        build(HERE / "c" / "compute.c", folder / "rounds.elf", "-DROUNDS=50")
-        build(HERE / "c" / "storm.c", folder / "storm.elf")
+        build(SOURCES / "compute.c", folder / "compute.elf", "-DROUNDS=65000")
+        build(SOURCES / "compute.c", folder / "rounds.elf", "-DROUNDS=50")
+        build(SOURCES / "storm.c", folder / "storm.elf")
         build_kernel(folder / "kernel.elf")
         for image in ("compute", "kernel", "storm"):
             report[image] = measure(folder / f"{image}.elf", cycles, options.repeat)

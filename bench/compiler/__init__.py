@@ -1,0 +1,1 @@
+"""Size, speed and proofs of compiled code, and time of compilation."""

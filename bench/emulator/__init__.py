@@ -1,0 +1,1 @@
+"""Speed of the emulator and of its instruments."""

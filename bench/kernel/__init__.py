@@ -1,0 +1,1 @@
+"""Bounds, stacks and structures of the kernel, and the comparison with other systems."""

@@ -1,0 +1,1 @@
+"""Speed of the arena and of Kilobots in a crowd."""
