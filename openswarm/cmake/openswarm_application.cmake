@@ -23,7 +23,7 @@ function(openswarm_application name)
   get_filename_component(beside ${firmware} DIRECTORY)
   set(out ${CMAKE_CURRENT_BINARY_DIR}/${name}.make)
   set(words "OUT=${out}" "PYTHON=${python}" "WARNINGS=-Wall -Wextra"
-      "RECORDED=-ffile-prefix-map=${PROJECT_SOURCE_DIR}/= -ffile-prefix-map=${beside}/=")
+      "RECORDED=-ffile-prefix-map=${beside}/= -ffile-prefix-map=${PROJECT_SOURCE_DIR}/=")
   if(APP_FOLDER)
     get_filename_component(folder ${APP_FOLDER} ABSOLUTE BASE_DIR ${CMAKE_CURRENT_SOURCE_DIR})
     get_filename_component(apps ${folder} DIRECTORY)
