@@ -66,7 +66,7 @@ class Comparison:
             if comparable(seen) == comparable(wanted):
                 self.compared += 1
                 return None
-        if out_of_memory(seen) > out_of_memory(wanted):  # a fragmented heap, which the model does not know
+        if is_out_of_memory(seen, wanted):  # a fragmented heap, which the model does not know
             return None
         return Difference(0, comparable(seen), comparable(wanted))
 
@@ -203,9 +203,12 @@ def without_final_state(records: list[Record]) -> list[Record]:
     return [record for record in records if record[1] != Kind.FINAL]
 
 
-def out_of_memory(records: list[Record]) -> int:
-    """Return the number of records whose last error is SYS_ERROR_MEMORY."""
-    return sum(record[6] == Error.MEMORY for record in records)
+def is_out_of_memory(seen: list[Record], wanted: list[Record]) -> bool:
+    """Whether the machine ran out of memory more often than the model, or where their records begin to differ."""
+    first = next(((a, b) for a, b in zip(comparable(seen), comparable(wanted), strict=False) if a != b), None)
+    if first is not None and first[0][6] == Error.MEMORY != first[1][6]:
+        return True
+    return sum(record[6] == Error.MEMORY for record in seen) > sum(record[6] == Error.MEMORY for record in wanted)
 
 
 def comparable(records: list[Record]) -> list[Record]:
