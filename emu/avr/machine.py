@@ -19,6 +19,7 @@ from emu.avr.core.addresses import ADDRESSES
 from emu.avr.core.state import EEPROM_BYTES, FLASH_BYTES, LOG_ROOM, PROGRAM_ENTRIES, Avr, Decoded
 from emu.avr.image import AvrImage
 from emu.avr.native import native
+from emu.image.symbols import STOP_FUNCTION
 
 HZ: Final = 8_000_000
 """Clock frequency in Hz of the internal oscillator."""
@@ -103,6 +104,9 @@ class Atmega328p:
         self.state.random = (seed * 2_654_435_761 & 0xFFFF_FFFF) or 1
         end = image.symbols.find("_end")
         self.state.data_end = end.address - 1 if end is not None and end.space == "data" else 0
+        stop = image.symbols.find(STOP_FUNCTION)
+        self._kernel_stop: Final = range(stop.address // 2, (stop.address + stop.size) // 2) if stop else range(0)
+        """Word addresses of the kernel's function for a fatal stop."""
         self.changes: Final[list[Change]] = []
         """Outputs since the caller cleared the list."""
         self._native["avr_power_on"](self._address)
@@ -164,9 +168,11 @@ class Atmega328p:
 
     @property
     def fault(self) -> AvrFault | None:
-        """Return the fault that stopped the machine."""
+        """Return the fault that stopped the machine; a fatal stop of the kernel is one."""
         state = self.state
         if not state.fault:
+            if state.halted and state.pc in self._kernel_stop:
+                return AvrFault("the kernel stopped the system", 2 * state.pc, state.halted_at)
             return None
         address = state.fault_address
         text = _FAULTS[state.fault].format(address=address, vector=VECTORS[address % len(VECTORS)])

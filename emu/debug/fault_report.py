@@ -31,6 +31,7 @@ from emu.dspic30f.isa.codec import decode_for_execution
 from emu.dspic30f.isa.debug import FAILED_CHECK, PLAIN_TRAP
 from emu.dspic30f.state.state import IPL3, STACK_POINTER
 from emu.image.model import ERASED
+from emu.image.symbols import STOP_FUNCTION
 from emu.machine.fault import FaultReport, StackEntry, TakenBranch
 
 if TYPE_CHECKING:
@@ -44,8 +45,6 @@ TRAPS: Final = {
     "MathError": ("MATHERR", "math error trap"),
 }
 """Flag in INTCON1 (isa.md §14.4) and description of each trap, by the name of its vector."""
-STOP_FUNCTION: Final = "hal_stop"
-"""Function in which OpenSwarm halts after a failed assertion or a fatal trap (firmware/openswarm/hal/hal_cpu.h)."""
 REPORTING_FUNCTIONS: Final = frozenset(
     (STOP_FUNCTION, "stop", "os_trap", "Sys_Assertion_Failed", "__assert_fail", "abort")
 )

@@ -12,6 +12,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Final
 
+STOP_FUNCTION: Final = "hal_stop"
+"""Function in which OpenSwarm halts after a failed assertion or a fatal trap (firmware/openswarm/hal/hal_cpu.h)."""
 _COMPILER_LABEL: Final = re.compile(r"\.L|L\d|___(PA|BP)___|__ext_attr_|\.(LFE|LSM|LBB)")
 """Pattern of labels that the compiler and assembler generate (abi-elf.md §4.3, §6.5)."""
 

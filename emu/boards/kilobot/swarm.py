@@ -27,6 +27,8 @@ from emu.avr.native import TYPES, native
 from emu.avr.observation import STOP_NONE, Observation
 from emu.native_library import ADDRESS, INT, address_of, functions_of
 
+_STOPPED: Final = 1 << 62
+"""Tick that a stopped robot has reached (air.c)."""
 REACH_MM: Final = 70.0
 """Default range in mm between the centres of two robots. Sellers state 7 cm, real data 14 cm (kilobot.md §1)."""
 FULL_SCALE: Final = 1023
@@ -261,19 +263,25 @@ class KilobotSwarm:
             if index < 0:
                 break
             machine = self.robots[index]
-            fault = machine.attend()
+            machine.attend()
             self._robots[index].code = machine.program.address
-            if fault is not None:
-                place = machine.image.place(fault.pc)
-                raise KilobotFaultError(index, f"{fault.message} at {place}, cycle {fault.cycle}")
+            self._attend(index)
             if self.is_stopped:
                 break
         if self.is_stopped:
             self.now = min(self._robots[self._observed[0]].reached, tick)
-        for machine in self.robots:
-            machine.attend()
         if self._air.lost_edges:
             raise ValueError("more pulses of light wait for a robot than there is room for")
+        for index in range(len(self.robots)):
+            self._attend(index)
+
+    def _attend(self, index: int) -> None:
+        """Attend a robot (`Atmega328p.attend`). Raises KilobotFaultError at a fault of a robot that is not stopped."""
+        machine = self.robots[index]
+        fault = machine.attend()
+        if fault is not None and self._robots[index].reached != _STOPPED:
+            place = machine.image.place(fault.pc)
+            raise KilobotFaultError(index, f"{fault.message} at {place}, cycle {fault.cycle}")
 
     @property
     def _parts(self) -> list[tuple[int, int]]:

@@ -7,6 +7,9 @@ from pathlib import Path
 import pytest
 
 import emu
+from emu.avr.image import load_avr_image
+from emu.boards.kilobot.swarm import KilobotFaultError, KilobotSetup, KilobotSwarm
+from emu.cli import main
 from firmware.tools.simulated import qemu
 from firmware.tools.simulated.kilobot import HZ
 from firmware.tools.simulated.machine import NotInstalled, Stopped
@@ -196,6 +199,24 @@ def test_a_fault_before_the_kernel_names_main(target: str, tmp_path: Path) -> No
     (tmp_path / "early" / "main.c").write_text(EARLY)
     image = make(target, "early", tmp_path / "out", apps=tmp_path)
     assert said_in_qemu(target, image, rb"thread \d+\r\n") == b"early.c:7 in thread 0\r\n"
+
+
+def test_a_failed_assertion_on_a_kilobot_is_a_fault(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A fatal stop of the kernel on a Kilobot is a fault of `emu run` and of a swarm, which names the robot once."""
+    (tmp_path / "early").mkdir()
+    (tmp_path / "early" / "main.c").write_text(EARLY)
+    image = make("kilobot", "early", tmp_path / "out", apps=tmp_path)
+    assert main(["run", str(image), "--board", "kilobot", "--seconds", "1"]) == 1
+    told = capsys.readouterr().err
+    assert "emu run: fault: the kernel stopped the system" in told
+    assert "hal_stop" in told
+    swarm = KilobotSwarm([KilobotSetup(load_avr_image(image), number=number) for number in range(2)])
+    for robot in range(2):
+        with pytest.raises(KilobotFaultError, match=r"the kernel stopped the system at .*hal_stop") as caught:
+            swarm.run(0.1)
+        assert caught.value.robot == robot
+        swarm.stop(robot)
+    swarm.run(0.1)
 
 
 # ---- Requests -------------------------------------------------------------------------------------------------------

@@ -35,6 +35,7 @@ void board_failsafe(void)
 
 void board_report(const char *text)
 {
+    UCSR0B |= 1 << TXEN0; /* also before board_init() */
     while (*text != '\0') {
         while (!(UCSR0A & 1 << UDRE0)) {
         }
