@@ -11,7 +11,8 @@ from dataclasses import asdict
 from typing import Protocol
 
 from emu.dspic30f.isa.row import Insn
-from emu.dspic30f.jit.engine import BLOCK_LEVEL, CodeTable, JitEngine
+from emu.dspic30f.jit.code_table import CodeTable
+from emu.dspic30f.jit.engine import BLOCK_LEVEL, JitEngine
 from emu.dspic30f.jit.ir.values import Number
 from emu.dspic30f.jit.translate.function import Translator
 from emu.dspic30f.jit.translate.region import Region, Step

@@ -10,7 +10,6 @@ import ctypes
 import hashlib
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
 from functools import partial
 from time import perf_counter
 from types import MappingProxyType
@@ -18,10 +17,10 @@ from typing import TYPE_CHECKING, Any, Final
 from weakref import WeakValueDictionary
 
 from emu.dspic30f.core import ONE_INSTRUMENT, Core
-from emu.dspic30f.isa.builder import Context
 from emu.dspic30f.isa.codec import decode_for_execution
 from emu.dspic30f.isa.facts import facts_of
 from emu.dspic30f.isa.row import Insn
+from emu.dspic30f.jit.code_table import CodeTable, EngineStatistics
 from emu.dspic30f.jit.cold_runner import ColdRunner
 from emu.dspic30f.jit.compiler import LoadedCode, shared_compiler
 from emu.dspic30f.jit.environment import (
@@ -45,7 +44,7 @@ from emu.dspic30f.jit.environment import (
     STEPS,
 )
 from emu.dspic30f.jit.exit_reasons import BOUNDARY_WORK, DEADLINE, HOOK, INTERPRET, MISS, RETFIE, UNFINISHED
-from emu.dspic30f.jit.hot_regions import SAMPLE_CYCLES, HotRegions
+from emu.dspic30f.jit.hot_regions import SAMPLE_CYCLES
 from emu.dspic30f.jit.machine_layout import (
     MachineLayout,
     machine_layout,
@@ -91,48 +90,8 @@ NATIVE_SFRS: Final = {"corcon": "CORCON", "ie0": "IEC0", "ie1": "IEC1", "ie2": "
 Call = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_void_p, ctypes.c_void_p)
 
 
-@dataclass(eq=False)
-class CodeTable:
-    """Native code for one set of processor modes: two tables of code addresses by program word.
-
-    Machines of the same kind with the same program share it, so that a region is translated once for all of them.
-    """
-
-    context: Context
-    layout: MachineLayout
-    identity: bytes
-    """Hash of all inputs of the code except program words."""
-    indirect_sfr: LoadedCode
-    """Native helper for indirect SFR access."""
-    blocks: Any
-    steps: Any
-    loaded: list[LoadedCode] = field(default_factory=list)
-    """Loaded code to which the tables point; it must stay alive."""
-    regions: dict[int, Region] = field(default_factory=dict)
-    """Requested regions by start address."""
-    entries: set[int] = field(default_factory=set)
-    """Leaders (entry addresses) of all requested regions."""
-    heat: dict[int, int] = field(default_factory=dict)
-    """How often each address without code was reached."""
-    hot: HotRegions = field(init=False)
-
-    def __post_init__(self) -> None:
-        self.hot = HotRegions(self.regions)
-
-
 _shared: Final[WeakValueDictionary[object, CodeTable]] = WeakValueDictionary()
 """Code tables in use, by the inputs of their code."""
-
-
-@dataclass
-class EngineStatistics:
-    """Counts of native runs, interpreted instructions, cold runs, regions, and hot regions."""
-
-    runs: int = 0
-    interpreted: int = 0
-    cold: int = 0
-    regions: int = 0
-    hot: int = 0
 
 
 class JitEngine:
