@@ -220,7 +220,7 @@ def test_progress_without_a_terminal_is_plain_lines(tmp_path: Path) -> None:
     run = start_arena(*SHORT[:-4], "--trials", 3, "--jobs", 1, "--out", tmp_path)
     out, output = run.communicate(timeout=HANG)
     assert run.returncode == 0
-    lines = output.splitlines()
+    lines = [line for line in output.splitlines() if " at " not in line]  # a busy machine also prints partial progress
     assert [line.split(" done in ")[0] for line in lines] == ["trial 1", "trial 2", "trial 3"]
     assert lines[-1].endswith("3 of 3 (100% of all)")
     assert "done in" not in out
