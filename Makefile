@@ -3,6 +3,7 @@
 #   make check      lint, types of changed packages and the quick tests: what to run before every commit
 #   make test       everything: lint, types, all tests
 #   make campaigns  random programs and inputs, with seeds that move on with the commit
+#   make coverage   which lines of the Python code the quick tests run: docs/coverage.md
 #   make arena, make bench, make site, make serve, make sbom, make clean
 # Each target installs the extras it needs into .venv and says so.
 
@@ -50,6 +51,10 @@ test: $(VENV)/.extra-arena $(VENV)/.extra-film $(VENV)/.extra-docs $(VENV)/.extr
 	$(PY) -m pytest -n $(JOBS) --dist worksteal -m "" tests $(PYTEST); tests=$$?; \
 	wait $$types; types=$$?; cat build/types; exit $$((tests != 0 || types != 0))
 
+coverage: $(VENV)/.extra-arena $(VENV)/.extra-test
+	COVERAGE_CORE=sysmon $(PY) -m pytest -n $(JOBS) --dist worksteal --cov --cov-report=json:build/coverage.json $(PYTEST) tests
+	$(PY) docs/tools/coverage_table.py build/coverage.json
+
 bench: $(VENV)/.extra-arena $(VENV)/.extra-test
 	$(PY) -m bench
 
@@ -84,5 +89,5 @@ clean:
 	rm -rf firmware.elf firmware/build build
 
 FORCE:
-.PHONY: run arena check test bench campaigns site serve sbom clean FORCE
+.PHONY: run arena check test coverage bench campaigns site serve sbom clean FORCE
 .PRECIOUS: $(VENV)/.extra-%
