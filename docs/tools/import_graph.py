@@ -104,10 +104,11 @@ def draw(package: str) -> str:
     """Return the picture of a package as SVG."""
     graph = imports_of(package)
     rows = rows_of(graph)
+    wide = round(max(map(width_of, rows))) + 2 * MARGIN
     centre: dict[str, tuple[float, float]] = {}
     boxes: list[str] = []
     for number, parts in enumerate(rows):
-        left = (WIDEST - width_of(parts)) / 2
+        left = (wide - width_of(parts)) / 2
         top = MARGIN + number * ROW
         for part in parts:
             width = box_width(part)
@@ -120,8 +121,8 @@ def draw(package: str) -> str:
             (x, y), (to_x, to_y) = centre[part], centre[other]
             start, middle = y + BOX, (y + BOX + to_y) / 2
             lines.append(f'<path d="M{x:.1f} {start}C{x:.1f} {middle:.1f} {to_x:.1f} {middle:.1f} {to_x:.1f} {to_y}"/>')
-    size = f'width="{WIDEST}" height="{MARGIN + len(rows) * ROW}"'
-    box = f'viewBox="0 0 {WIDEST} {MARGIN + len(rows) * ROW}"'
+    size = f'width="{wide}" height="{MARGIN + len(rows) * ROW}"'
+    box = f'viewBox="0 0 {wide} {MARGIN + len(rows) * ROW}"'
     title = f"<title>Imports of {package}: each box imports boxes below it</title>"
     body = "\n".join(
         (title, f"<style>{STYLE}</style>", '<rect width="100%" height="100%" fill="#fff"/>', *lines, *boxes)
@@ -157,7 +158,8 @@ def page(folder: Path) -> str:
     for package in PACKAGES:
         picture = folder / f"imports-{package}.svg"
         picture.write_text(draw(package), encoding="utf-8")
-        parts.append(f"## {package}\n\n![Modules of {package}, each above what it imports]({picture.name})\n")
+        shown = f"![Modules of {package}, each above what it imports]({picture.name})"
+        parts.append(f"## {package}\n\n[{shown}]({picture.name})\n")
     return "\n".join(parts)
 
 

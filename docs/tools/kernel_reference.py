@@ -88,7 +88,7 @@ def calls_of(header: Path) -> list[Call]:
 
 def _items(text: str) -> Iterator[Call | str]:
     """Yield the calls of a header, and Markdown text for its sections and types."""
-    comment, head = "", head_of(text)
+    comment, described, head = "", "", head_of(text)
     for kind, part in parts_of(text):
         name = CALL.match(part) if kind != "comment" else None
         if kind == "comment":
@@ -101,8 +101,10 @@ def _items(text: str) -> Iterator[Call | str]:
             if kind == "directive":
                 part = part.splitlines()[0].removesuffix("\\")
             yield Call(name[1], part.strip(), " ".join(comment.split()))
+            described = comment
         elif kind == "declaration":
-            yield f"{' '.join(comment.split())}\n\n```c\n{part.strip()}\n```\n"
+            own = "" if comment == described else " ".join(comment.split())  # not the contract of the call above
+            yield f"{own}\n\n```c\n{part.strip()}\n```\n"
             comment = ""
 
 
@@ -125,7 +127,7 @@ def page() -> str:
     parts = [INTRODUCTION]
     for header in sorted(FOLDER.glob("*.h")):
         text, last = header.read_text(encoding="utf-8"), ""
-        parts.append(f"## {header.name}\n\n```text\n{head_of(text)}\n```\n")
+        parts.append(f"## {header.name}\n\n```text\n{head_of(text)}\n```\n\n")
         for one in _items(text):
             if isinstance(one, str):
                 parts.append(one)

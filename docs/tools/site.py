@@ -16,6 +16,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
+import textwrap
 from pathlib import Path
 
 import import_graph
@@ -27,8 +28,24 @@ PROGRAMS = ("emu", "toolchain", "arena", "openswarm")
 LINK = re.compile(r"(\]\()([^)\s]+)(\))")
 OPTION = re.compile(r"^ {2,4}(-\S.*?)(?: {2,}(\S.*))?\n((?: {10,}\S.*\n)*)", re.MULTILINE)
 """An option in the output of `--help`: its names and arguments, the first line of its text, the other lines."""
-DIAGRAM = re.compile(r"^```\n(?=(?:(?!```).*\n)*?.*[─│└├])", re.MULTILINE)
-"""The first line of a code block without a language that contains lines drawn with characters."""
+FENCED = re.compile(r"(^```.*?^```\n)", re.MULTILINE | re.DOTALL)
+INDENTED = re.compile(r"^\n((?: {4}(?![-*+] |\d+\. ).*\n)+)(?=\n|\Z)", re.MULTILINE)
+"""A code block that is indented, with the empty line above it."""
+DRAWN = re.compile(r"[─│└├]|-->|\|->|(?<!\w)->(?!\w).*(?<!\w)->|(?<=\s)->\s+-{5}")
+"""What is in a diagram that is drawn with characters: lines or arrows."""
+COLUMNS = re.compile(r"(?:^(?!.*# ).*\S {3,}\S.*\n(?:.*\n)*?){3}", re.MULTILINE)
+"""Three lines of output in columns."""
+PICTURE = re.compile(r"(?<!\[)!\[[^\]]*\]\(([^)\s]+)\)")
+SPAN = re.compile(r"`[^`\n]*`")
+CODE = re.compile(r"<code\b.*?</code>", re.DOTALL)
+ARTICLE = re.compile(r"<article\b.*?</article>", re.DOTALL)
+CELL = re.compile(r"<t[dh]\b.*?</t[dh]>", re.DOTALL)
+JOINT = re.compile(r"(?<=[^\W_])_(?=[^\W_])|(?<=[\w)\]*])\.(?=\w{5})|::|(?<=[\w)\]*.])/(?=\w)|[,(=](?=\w)")
+"""Where a name in a cell may break: after this, so that a file keeps its suffix and a word is whole."""
+WHOLE = re.compile(r"(?<![\w-])--?[A-Za-z]\w*|-+&gt;|&lt;-+")
+"""What a browser would break after its hyphens: the first word of an option, an arrow."""
+POWER = re.compile(r"\d+(?:\.\d+)?e-\d+")
+"""A number that a browser would break after its minus sign."""
 KEYS = Path("docs/scene-keys.md")
 
 
@@ -57,9 +74,52 @@ def copy_pages(source: Path) -> None:
 
 
 def with_pages(text: str, page: Path) -> str:
-    """Return the text of a page with links to folders replaced by links to their READMEs, and with marked diagrams."""
-    text = DIAGRAM.sub("``` { .text .diagram }\n", text)
+    """Return the text of a page for the site: links to folders lead to their READMEs, pictures to their files, and
+    diagrams are marked."""
+    text = PICTURE.sub(r"[\g<0>](\1)", with_marks(text))
+    text = re.sub(r"^\|.*", lambda row: re.sub(rf"{SPAN.pattern}| \{{", _in_row, row[0]), text, flags=re.MULTILINE)
     return LINK.sub(lambda found: found[1] + to_page(page, found[2]) + found[3], text)
+
+
+def with_marks(text: str) -> str:
+    """Return the text of a page with its diagrams and columns marked: code blocks without a language, or indented."""
+    parts = FENCED.split(text)  # every other part is a fenced block
+    parts[::2] = [INDENTED.sub(_as_fenced, part) for part in parts[::2]]
+    parts[1::2] = [re.sub(r"\A```\n", f"```{_marks(part)}\n", part) for part in parts[1::2]]
+    return "".join(parts)
+
+
+def _marks(block: str) -> str:
+    """Return the classes of a code block whose lines must stay whole, as Markdown attributes; empty for others."""
+    return " { .text .diagram }" if DRAWN.search(block) else " { .text .columns }" if COLUMNS.search(block) else ""
+
+
+def _as_fenced(block: re.Match[str]) -> str:
+    return f"\n```{_marks(block[1])}\n{textwrap.dedent(block[1])}```\n" if _marks(block[1]) else block[0]
+
+
+def _in_row(found: re.Match[str]) -> str:
+    """Return a part of a table's row for Python-Markdown: code without the backslash before a bar, which GitHub needs;
+    a brace that does not begin attributes of the cell."""
+    return r" \{" if found[0] == " {" else found[0].replace(r"\|", "|")
+
+
+def with_breaks(text: str) -> str:
+    """Return the HTML of a page whose code breaks where a reader expects it: names in tables after the marks between
+    their words, options and arrows not behind their hyphens."""
+    whole = r'<span class="whole">\g<0></span>'
+    text = CELL.sub(lambda cell: _in_text(POWER, whole, _in_code(JOINT, r"\g<0><wbr>", cell[0])), text)
+    return ARTICLE.sub(lambda article: _in_text(WHOLE, whole, article[0]), text)
+
+
+def _in_code(pattern: re.Pattern[str], wanted: str, text: str) -> str:
+    """Return HTML with a pattern replaced in the text of its code, not in tags."""
+    return CODE.sub(lambda code: _in_text(pattern, wanted, code[0]), text)
+
+
+def _in_text(pattern: re.Pattern[str], wanted: str, text: str) -> str:
+    """Return HTML with a pattern replaced in its text, not in tags."""
+    return re.sub(r">[^<]+", lambda part: pattern.sub(wanted, part[0]), text)
 
 
 def to_page(page: Path, target: str) -> str:
@@ -82,12 +142,14 @@ def with_anchors(text: str) -> str:
 def options_of(command: str, said: str) -> str:
     """Return the `--help` output of a command in Markdown, with a heading for each option: `emu run --seconds S`."""
     parts, end = [], 0
-    for found in OPTION.finditer(said):
+    start = re.search(r"^options:$", said, re.MULTILINE)  # examples above it are no options
+    for found in OPTION.finditer(said, start.start() if start else 0):
         names, first, more = found.groups(default="")
         anchor = command.replace(" ", "-") + re.findall(r"(?<!\S)-[\w-]+", names)[-1]
         parts.append(_block(said[end : found.start()]))
         parts.append(f'<h5 id="{anchor}">{html.escape(f"{command} {names}")}</h5>\n')
-        parts.append(f"<p>{html.escape(' '.join(f'{first} {more}'.split()))}</p>\n")
+        words = re.sub("`([^`]+)`", r"<code>\1</code>", html.escape(" ".join(f"{first} {more}".split())))
+        parts.append(f"<p>{words}</p>\n")
         end = found.end()
     return "\n".join(filter(None, [*parts, _block(said[end:])]))
 
@@ -95,6 +157,9 @@ def options_of(command: str, said: str) -> str:
 def _block(text: str) -> str:
     """Return a part of a help text in Markdown: the title of an option group in bold, other text as a code block."""
     text = re.sub(r"\n*^options:$", "", text.strip("\n"), flags=re.MULTILINE)
+    if text.startswith("usage:"):  # the browser breaks its lines
+        usage, gap, rest = text.partition("\n\n")
+        text = re.sub(r"\n {7,}", " ", usage) + gap + rest
     title = re.fullmatch(r"(\w[\w ]*):", text)
     return f"**{title[1]}**\n" if title else f"```text\n{text}\n```\n" if text else ""
 
@@ -168,6 +233,8 @@ def main() -> int:
         ]
         surroundings = os.environ | {"NO_MKDOCS_2_WARNING": "1"}
         status = subprocess.run([sys.executable, *map(str, words)], cwd=ROOT, env=surroundings, check=False).returncode
+    for page in wanted.out.rglob("*.html"):
+        page.write_text(with_breaks(page.read_text(encoding="utf-8")), encoding="utf-8")
     # the page for wrong addresses names its style sheets from the server's root, where they may not be
     (wanted.out / "404.html").unlink(missing_ok=True)
     return status

@@ -61,6 +61,17 @@ def test_pages_name_their_files_relative_to_themselves(site: Path) -> None:
 
 
 @pytest.mark.slow
+def test_formulas_in_tables_and_lists_are_complete(site: Path) -> None:
+    """Braces at the end of a cell are no attributes, bars have no backslash, and products are no emphasis."""
+    isa = (site / "docs/reference/isa.html").read_text(encoding="utf-8")
+    assert "[W15+2] = {000000000, PCret&lt;22:16&gt;}" in isa
+    assert re.findall(r"<t[dh] (?!style=|class=)[^>]*>", isa) == []
+    assert r"\|" not in (site / "docs/reference/avr.html").read_text(encoding="utf-8")
+    dsp = (site / "toolchain/runtime/dsp.html").read_text(encoding="utf-8")
+    assert "31 + M*(7 + N*(7 + 4*S))" in dsp
+
+
+@pytest.mark.slow
 def test_every_kernel_call_has_an_anchor(site: Path) -> None:
     """Every function and macro `Sys_*` that a header declares has an anchor of its name on the page of the kernel."""
     text = (site / "reference/kernel-calls.html").read_text(encoding="utf-8")

@@ -95,7 +95,7 @@ SECTIONS: list[tuple[str, list[tuple[str, str, str]]]] = [
         ("-fvolatile[-global]", REFUSED, "declare the objects volatile"),
         ("-fvolatile-static", REFUSED, "declare the objects volatile"),
         ("-f[no-]cond-mismatch", REFUSED, "both operands of ?: need compatible types"),
-        ("-ext=cci", DRIVER, "Common C Interface: defines __CCI__; xc.h has its keywords"),
+        ("-ext=cci", DRIVER, "Common C Interface: defines `__CCI__`; xc.h has its keywords"),
         ("-ext=<name>", IGNORED, "the language with gcc's and XC16's extensions is the default"),
         ("-mcci", DRIVER, "as -ext=cci"),
         ("-aux-info <file>", REFUSED, "prototypes are not written to a file"),
