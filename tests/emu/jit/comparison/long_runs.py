@@ -43,8 +43,8 @@ class CountedInterpreter:
 class CountingTranslator(Translator):
     """Translator of exact code that counts instructions in `advance`, which it calls once per instruction."""
 
-    def advance(self, cycles: Number, mask: int, times: int = 1) -> None:
-        super().advance(cycles, mask, times)
+    def advance(self, pc: int, cycles: Number, mask: int, times: int = 1) -> None:
+        super().advance(pc, cycles, mask, times)
         if self.exact:
             e = self.e
             place = e.name()
