@@ -80,6 +80,36 @@ def stops(machine: emu.Machine, condition: str, place: str = "mark") -> tuple[li
     return found, calls
 
 
+def test_native_code_continues_from_an_arrival_that_python_has_seen(image: Path) -> None:
+    """Native code stops at the next arrival whose condition holds, also if the run began at an arrival whose hook
+    Python has called in vain, because the code was loaded only afterwards."""
+    plain, native = machine_of(image, "plain"), machine_of(image, "jit")
+    address = native.program_address("mark")
+    filter_ = filter_of(native.inspector, "W0 == 2", address)
+    assert filter_ is not None
+    native.hook_pc(address, lambda: native.w[0] == 2, filter_)
+    native.run(cycles=20_000)
+    engine = native.runner
+    assert isinstance(engine, JitEngine)
+    natively, found, expected = engine.natively, [], []
+    waiting = 0
+
+    def not_at_first(limit: int) -> bool:
+        nonlocal waiting
+        waiting -= 1
+        return waiting < 0 and natively(limit)
+
+    engine.natively = not_at_first  # type: ignore[method-assign]
+    for start in range(20_000, 40_000, 2_000):
+        plain.run(cycles=start - plain.cycle)
+        plain.run(cycles=5_000, until="mark", when="W0 == 1")
+        native.restore(plain.snapshot())
+        waiting = 1
+        found.append(native.run(cycles=5_000).cycle)
+        expected.append(plain.run(cycles=5_000, until="mark", when="W0 == 2").cycle)
+    assert found == expected
+
+
 @pytest.mark.parametrize(("place", "condition"), CONDITIONS)
 def test_the_stops_are_those_of_the_plain_engine(image: Path, place: str, condition: str) -> None:
     expected, arrivals = stops(machine_of(image, "plain"), condition, place)

@@ -235,19 +235,18 @@ class Translator(FunctionFrame):
     def _stop_for_hook(self, pc: int) -> None:
         """Leave native code before the hooked address `pc`, unless its hook was just called or no filter holds."""
         e, filters = self.e, self.layout.filters.get(pc)
-        if filters is not None:
-            calls, passes = e.fresh("calls"), e.fresh("passes")
-            e.end(f"br i1 {truth(some_filter_holds(self, filters, calls))}, label %{calls}, label %{passes}")
-            e.start(calls)
-        word, seen = e.name(), e.fresh("seen")
+        word, passes = e.name(), e.fresh("passes")
         e.line(f"{word} = getelementptr i64, ptr %env, i64 {RESUME}")
         hooked = e.load(word, 64)
-        e.end(f"br i1 {truth(hooked == pc)}, label %{seen}, label %{self.exit(pc, HOOK)}")
-        e.start(seen)
-        e.line(f"store i64 {NOWHERE}, ptr {word}, align 1")
+        is_called = hooked == pc
+        # also if no filter holds now: the next arrival in this run has not been seen
+        e.line(f"store i64 {wide(e.select(is_called, NOWHERE, hooked))}, ptr {word}, align 1")
         if filters is not None:
-            e.end(f"br label %{passes}")
-            e.start(passes)
+            calls = e.fresh("calls")
+            e.end(f"br i1 {truth(some_filter_holds(self, filters, calls))}, label %{calls}, label %{passes}")
+            e.start(calls)
+        e.end(f"br i1 {truth(is_called)}, label %{passes}, label %{self.exit(pc, HOOK)}")
+        e.start(passes)
 
     # -- instructions -----------------------------------------------------------------------------------------------
     def _instruction(self, step: Step, written: Number) -> tuple[bool, Number]:
