@@ -33,8 +33,6 @@ VECTORS = {"machine_clock_due": 12, "machine_slice_due": 14, "machine_device_due
 """By function at which the test sets a flag of the ATmega328P: the number of its vector."""
 FIRST_ARGUMENT = 24
 """Data address of R24, whose pair with R25 has the first argument of a function."""
-EVENTS_LOST = 4
-"""Offset of events_lost in sys_statistics, which has only 16-bit members."""
 HEAP, HEAP_IN_QEMU, HEAP_OF_KILOBOT = 3500, 24_000, 480
 """Heap bytes above which a program is not compared, because the model has no fragmentation."""
 OF_A_PORT = (Code.UNUSED_STACK, Code.UNUSED_KERNEL_STACK)
@@ -144,15 +142,13 @@ class CpuInQemu(Comparison):
 class KilobotCpu(Comparison):
     """The Kilobot's CPU in simavr, which starts once per program. Raises NotInstalled.
 
-    Not compared are programs with cleanups, whose script runs on the stack of another script, and those that its 2 kB
-    of RAM cannot hold.
+    Not compared are programs with an interrupt within a call; those with cleanups, whose script runs on the stack of
+    another script; and those that its 2 kB of RAM cannot hold.
     """
 
     heap = HEAP_OF_KILOBOT
     overflows = 0
     """Programs that a stack overflow stopped: a port with less memory has smaller stacks than they need."""
-    lost = 0
-    """Messages that the last program lost for lack of memory. The clock's event is lost without an error."""
 
     def __init__(self, image: Path) -> None:
         self.image = image
@@ -168,17 +164,15 @@ class KilobotCpu(Comparison):
         return machine
 
     def difference(self, program: Program) -> Difference | None:
-        executor = Executor(program, self.sizes)
-        alone = executor.run(self.base)
+        alone = Executor(program, self.sizes).run(self.base)
         codes = {Code(operation[0]) for script in program.scripts for operation in script.operations}
-        if Code.PUSH in codes or max(record[4] for record in alone) >= MOST_PIDS:
+        if codes & {Code.LATER, Code.PUSH} or max(record[4] for record in alone) >= MOST_PIDS:
             return None
         if len(program.encoded()) > PROGRAM_BYTES:
             return None
         before = self.overflows
         difference = super().difference(program)
-        out_of_memory = self.lost > executor.k.events_lost
-        return None if out_of_memory or self.overflows > before else difference
+        return None if self.overflows > before else difference
 
     def run(self, program: Program, most: int) -> list[Record]:
         records: list[Record] = []
@@ -202,7 +196,6 @@ class KilobotCpu(Comparison):
                     machine.interrupt(due[place])
                 else:
                     idles += 1
-            self.lost = peek(machine, "os_statistics", EVENTS_LOST)
         return records
 
 
