@@ -39,7 +39,7 @@ from emu.machine.stops import (
 from emu.peripherals import CpuSignals, Peripherals, build
 from emu.system.bus import Bus
 from emu.system.events import NEVER, Events
-from emu.system.filters import Filter
+from emu.system.hook_filters import Filter
 from emu.system.native_handle import Native, Run
 from emu.system.program import ProgramMemory
 from emu.system.record import Record
@@ -338,10 +338,11 @@ class Machine(StateAccess):
 
     def advance(self, cycle: int) -> Stop | None:
         """Run as `run_until` does, and take checkpoints from which a fault can be diagnosed."""
+        state = self.save_state()
         while True:
-            self.checkpoints.take(self.cycle, self.save_state())
+            self.checkpoints.take(self.cycle, state)
             stop = self.run_until(min(cycle, self.cycle + CHECKPOINT_CYCLES))
-            self.checkpoints.end = self.save_state()
+            state = self.checkpoints.end = self.save_state()
             if stop is not None or self.cycle >= cycle:
                 return stop
 

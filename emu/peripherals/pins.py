@@ -118,6 +118,8 @@ class Pins:
         ring = record.reserve("pins.ring", "Q", RING).index
         self.ring: Final = record.u64[ring : ring + RING]
         """Ring of changes made by native code, each encoded as cycle << 24 | port << 16 | levels."""
+        self._ring_ports: Final = record.u8[8 * ring + 2 :]
+        """From the first port in `ring`, one in each 8 bytes (the host is little-endian)."""
         self._u64: Final = record.u64
         self._count: Final = record.reserve("pins.ring_count", "Q").index
         self._logged: Final = record.reserve("pins.logged", "Q").index
@@ -241,7 +243,12 @@ class Pins:
         for reader in self._readers:
             reader(self._ring_address, count)
         entries = self.ring[:count].tolist()
+        ports = bytes(self._ring_ports[: 8 * count : 8])
         self.ring[:count] = self._clean[:count]
+        if not any(self._ring_watchers[port] for port in set(ports)):  # readers have processed all entries
+            for port in set(ports):
+                self._reported[port] = entries[ports.rindex(port)] & 0xFFFF
+            return
         for entry in entries:
             port = entry >> 16 & 0xFF
             watchers = self._ring_watchers[port]

@@ -57,7 +57,7 @@ from emu.dspic30f.state.modes import Key, Modes
 from emu.dspic30f.state.state import IPL3, NOT_REPEATING, RUN
 from emu.system.arrivals import ArrivalHook, ArrivalLog, Recording
 from emu.system.events import NEVER
-from emu.system.filters import Filter
+from emu.system.hook_filters import Filter
 from emu.system.native_handle import FRESH_ROOM, Native, Run
 from emu.system.rules import Rule
 
@@ -128,6 +128,7 @@ class JitEngine:
         self._words: Final = core.chip.program["flash"].end // 2
         self.compiler = shared_compiler()
         self._computed: Final[dict[int, int]] = {}
+        self._refreshed: Final[set[int]] = set()
         self._env: Final = (ctypes.c_uint64 * ENV_WORDS)()
         self._env[SEEN] = NEVER
         self._env_address: Final = ctypes.addressof(self._env)
@@ -339,13 +340,14 @@ class JitEngine:
 
     def _remember_refresh(self, instruction: int) -> None:
         """Record an instruction whose register a device must update, for the host program that calls native code."""
-        fresh = self._env[REFRESHED : REFRESHED + FRESH_ROOM]
-        free = fresh.index(0)
-        if instruction not in fresh and free < FRESH_ROOM - 1:
-            self._env[REFRESHED + free] = instruction
+        count = len(self._refreshed)
+        if instruction not in self._refreshed and count < FRESH_ROOM - 1:
+            self._refreshed.add(instruction)
+            self._env[REFRESHED + count] = instruction
 
     def _forget_computed(self) -> None:
         self._computed.clear()
+        self._refreshed.clear()
         self._env[REFRESHED : REFRESHED + FRESH_ROOM] = [0] * FRESH_ROOM
 
     def _computed_word(self, pc: int) -> int:

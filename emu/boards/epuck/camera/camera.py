@@ -71,8 +71,6 @@ class Camera(BoardPart, I2cDevice):
         self._has_native_source, self._settings = False, 0
         self._pixels: PixelSource | None = None
         self._still: StillImage | None = None
-        self._href: Final = ctypes.c_int64()
-        self._href_at: Final = ctypes.addressof(self._href)
         self._timing: SensorTiming
         self._picture: ImageSettings
         self._readout: Readout | None
@@ -263,18 +261,8 @@ class Camera(BoardPart, I2cDevice):
         u64 = self._u64
         if not self._plugged.value or u64[self._line_from.index] <= cycle < u64[self._line_to.index]:
             return False
-        return (self._still is not None and self._render_natively(self._still, cycle)) or self._render(cycle)
-
-    def _render_natively(self, still: StillImage, cycle: int) -> bool:
-        """Render a line of a still picture by native code. Return False if `_render` has to do it.
-
-        Native code needs a row that an earlier `_render` has cut to the current columns.
-        """
-        row = still.row_on_bus(self._native_address, self.native.setting, cycle, self._href_at)
-        pixels = still.row_address(row)
-        if pixels:
-            still.write_line(self._native_address, self._href.value, pixels)
-        return bool(pixels)
+        still = self._still
+        return (still is not None and still.render_natively(self._native_address, cycle)) or self._render(cycle)
 
     def _render(self, cycle: int) -> bool:
         """Render the line that is on the bus in `cycle` into the record. Return False between lines."""

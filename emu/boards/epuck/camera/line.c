@@ -99,3 +99,14 @@ void write_line(const struct camera *c, i64 href, const uint8_t *pixels)
     *c->to = (u64)(begin + c->count * (c->form == GREY ? 1 : 2) * c->scan->byte_tcy);
     *c->byte_tcy = (u64)c->scan->byte_tcy;
 }
+
+// Render the line of a still picture that is on the bus in a cycle. `rows` has the pixels of each scene row in the
+// columns of the current settings, 0 for a row that was not read yet. Return whether the line was rendered.
+i64 render_still(const struct camera *c, i64 cycle, const uint8_t *const *rows)
+{
+    i64 href, row = row_on_bus(c, c->setting, cycle, &href);
+    if (row < 0 || !rows[row])
+        return 0;
+    write_line(c, href, rows[row]);
+    return 1;
+}

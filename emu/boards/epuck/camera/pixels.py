@@ -47,26 +47,28 @@ class StillImage:
         self._scene: Final = scene
         self._columns: NDArray[np.intp] | None = None
         self._cut: Final[dict[int, Pixels]] = {}
-        self._addresses: Final[dict[int, int]] = {}
-        code = line_code()
-        self.row_on_bus: Final = code["row_on_bus"]
-        self.write_line: Final = code["write_line"]
+        self._addresses: Final = (ctypes.c_void_p * HEIGHT)()
+        self._addresses_at: Final = ctypes.addressof(self._addresses)
+        self._render: Final = line_code()["render_still"]
 
     def __call__(self, y: int, columns: NDArray[np.intp], _cycle: int) -> Pixels:
         """Return a row's pixels in the given columns."""
         if columns is not self._columns:
             self._columns = columns
             self._cut.clear()
-            self._addresses.clear()
+            ctypes.memset(self._addresses, 0, ctypes.sizeof(self._addresses))
         found = self._cut.get(y)
         if found is None:
             found = self._cut[y] = np.ascontiguousarray(self._scene[y, columns])
             self._addresses[y] = found.ctypes.data
         return found
 
-    def row_address(self, y: int) -> int:
-        """Return the host address of a row that is already cut to the current columns, otherwise 0."""
-        return self._addresses.get(y, 0)
+    def render_natively(self, camera: int, cycle: int) -> bool:
+        """Render the line on the bus in `cycle` by native code, for the `NativeCamera` at host address `camera`.
+
+        Return False if Python must render it: for example, the row was not read with the current settings yet.
+        """
+        return bool(self._render(camera, cycle, self._addresses_at))
 
 
 Gains = ctypes.c_double * 3
@@ -131,6 +133,7 @@ def line_code() -> dict[str, Callable[..., int]]:
         "encode": (None, (ADDRESS, INT, INT, ADDRESS, ADDRESS)),
         "row_on_bus": (INT, (ADDRESS, INT, INT, ADDRESS)),
         "write_line": (None, (ADDRESS, INT, ADDRESS)),
+        "render_still": (INT, (ADDRESS, INT, ADDRESS)),
     })  # fmt: skip
 
 

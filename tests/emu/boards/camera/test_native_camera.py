@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from emu.boards.epuck.camera.camera import Camera
-from emu.boards.epuck.camera.pixels import line_code
+from emu.boards.epuck.camera.pixels import StillImage, line_code
 
 from ..conftest import Robot
 from .camera_driver import po3030, po6030, scene
@@ -75,7 +75,7 @@ def test_a_still_picture_is_rendered_like_a_callback(sensor: str, monkeypatch: p
     still.board.camera.show(pixels)
     other.board.camera.show_pixels(lambda y, columns, _cycle: pixels[y, columns])
     at_once = 0
-    paint = Camera._render_natively
+    paint = StillImage.render_natively
 
     def counted(*line: Any) -> bool:
         nonlocal at_once
@@ -83,7 +83,7 @@ def test_a_still_picture_is_rendered_like_a_callback(sensor: str, monkeypatch: p
         at_once += done
         return done
 
-    monkeypatch.setattr(Camera, "_render_natively", counted)
+    monkeypatch.setattr(StillImage, "render_natively", counted)
     settings = [po6030(), po6030(scale=2, form="yuv")] if sensor == "PO6030K" else [po3030(), po3030(form="yuv") + DARK]
     for _ in range(12):
         writes, lamp, is_plugged = draw.choice(settings), draw.choice([1.0, 1.0, 1.0, 1.0, 0.5]), draw.random() < 0.9
