@@ -17,7 +17,7 @@ from emu.host.completion import SHELLS, script
 from emu.host.completion import description as completion_description
 from emu.host.errors import JSON, CommandParser, report_error
 from emu.host.exit_status import BAD_INPUT, CANNOT_CONTINUE, DONE, INTERRUPTED, ignore_unread_output
-from emu.host.front import answer, listing
+from emu.host.top_level import answer, listing
 
 _USAGE: Final = """usage: arena COMMAND [options]
 

@@ -22,8 +22,8 @@ from arena.infrared.channel import OpticalChannel
 from arena.replay.video import arena_picture
 from arena.robots.controller import Controller, ScriptedController
 from arena.robots.firmware_controller import FirmwareController
-from arena.robots.own_controller import Policy, load_controller
 from arena.robots.senses import SenseReader, Senses
+from arena.robots.user_controller import Policy, load_controller
 from arena.scene import dimensions
 from arena.scene.loader import FCY, Scene, load_scene, scripted
 from arena.scene.robot_kind import EPUCK
@@ -246,7 +246,7 @@ class ArenaEnv(ParallelEnv):  # type: ignore[misc]
         return self._readers[robot].read(self._world.poses, self._world.seconds, wheels)
 
     def policy(self, path: Path) -> Callable[[], dict[str, Vector]]:
-        """Return a function that returns the actions of a controller in a Python file (robots/own_controller.py).
+        """Return a function that returns the actions of a controller in a Python file (robots/user_controller.py).
 
         It holds one instance of the controller per agent, with the random generators of a trial with this seed; create
         it after `reset`. Raises SceneError, also when the controller fails."""

@@ -16,7 +16,7 @@ from emu.commands import COMMANDS
 from emu.host.command import CommandError, Parser
 from emu.host.errors import JSON, report_error
 from emu.host.exit_status import BAD_INPUT, BAD_INPUT_AS_STATUS, DONE, ignore_unread_output
-from emu.host.front import answer, listing
+from emu.host.top_level import answer, listing
 
 _USAGE: Final = """usage: emu COMMAND [options]
 

@@ -14,7 +14,7 @@ from typing import Final, Protocol, cast
 
 from emu.host.errors import JSON, report_error
 from emu.host.exit_status import BAD_INPUT, INTERRUPTED, ignore_unread_output
-from emu.host.front import answer, listing
+from emu.host.top_level import answer, listing
 
 COMMANDS: Final = {
     "new": "set up a project: Makefile, CMake, main.c, a test, settings for VS Code",

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from emu.host.errors import JSON, report_error
 from emu.host.exit_status import BAD_INPUT, DONE, INTERRUPTED, ignore_unread_output
-from emu.host.front import answer
+from emu.host.top_level import answer
 from toolchain.errors import ToolError
 
 COMMANDS: dict[str, tuple[str, str]] = {
@@ -23,7 +23,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "ar": ("toolchain.commands.archiver", "make, list and extract static libraries"),
     "objdump": ("toolchain.commands.objdump", "show headers, symbols, disassembly with source"),
     "size": ("toolchain.commands.size", "show flash and RAM use"),
-    "nm": ("toolchain.commands.names", "list symbols with addresses and sizes"),
+    "nm": ("toolchain.commands.nm", "list symbols with addresses and sizes"),
     "hex": ("toolchain.commands.hex", "convert an ELF executable to Intel HEX"),
     "bounds": ("toolchain.commands.bounds", "worst-case time, stack and interrupt response"),
     "prove": ("toolchain.commands.prove", "prove that machine code does what the IR says"),

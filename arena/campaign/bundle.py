@@ -23,8 +23,8 @@ import numpy as np
 
 from arena.campaign.campaign import Plan, run_one, trial_path
 from arena.experiments import experiment_with_digest
-from arena.robots.own_controller import load_controller
 from arena.robots.reactive import SPEED_TABLES
+from arena.robots.user_controller import load_controller
 from arena.scene.loader import scene_of
 from arena.trial.manifest import MANIFEST, read_manifest
 from arena.trial.record import EXPERIMENT, RecordError, read_trial, write_bytes

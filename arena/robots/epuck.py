@@ -24,7 +24,7 @@ def controllers(
 def _controller(scene: Scene, seed: int, robot: int, program: Program, channel: OpticalChannel | None) -> Controller:
     """Return the controller of one robot."""
     if program.file is not None:
-        from arena.robots.own_controller import OwnController, load_controller
+        from arena.robots.user_controller import OwnController, load_controller
 
         return OwnController(scene, seed, robot, load_controller(program.file))
     if program.image is None:

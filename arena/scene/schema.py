@@ -301,7 +301,7 @@ class RobotGroup(Placed):
     - `image`: their controller, as `--brain`, or a program of firmware/kilobot for Kilobots; a path is relative to the
       scene file; empty: that of the run. `--brain` replaces the images of a scene in which every group has one.
     - `controller`: table A, B or aggregate, the controller transport, or a Python file or entry point
-      (robots/own_controller.py); a path is relative to the scene file; empty: that of the run
+      (robots/user_controller.py); a path is relative to the scene file; empty: that of the run
     - `id_first`: number of the first robot; the next ones count up. `{id}` in `stimulus` is replaced by it. It is the
       UID of a Kilobot.
     - `heading_deg`: heading at the start; nan: random

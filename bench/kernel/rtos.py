@@ -41,7 +41,7 @@ STACK_BYTES = 256
 SETTLING = 8
 """Number of measurement windows that are skipped at the start."""
 FRAMES_SEEN = 24
-"""Switches of each kind examined in bench/c/frames: every thread is among them."""
+"""Switches of each kind examined in bench/c/saved_frames: every thread is among them."""
 RETURN_ADDRESS = 4
 """Bytes that a call or an interrupt pushes (isa.md §7.4)."""
 PCB_STATUS, SYS_DSP = 8, 0x10
@@ -116,8 +116,8 @@ def run(*words: str | Path) -> None:
 def on_dspic(folder: Path) -> dict[str, Any]:
     """Return the cells of the dsPIC30F, measured as by `emu cycles` and `emu footprint`."""
     images = {}
-    for app in ("latency", "footprint", "smallest", "frames"):
-        apps = ["APPS=../bench/c"] if app == "frames" else []
+    for app in ("latency", "footprint", "smallest", "saved_frames"):
+        apps = ["APPS=../bench/c"] if app == "saved_frames" else []
         run("make", "-s", "-C", "firmware", f"APP={app}", f"OUT={folder / app}", f"PYTHON={sys.executable}", *apps)
         images[app] = load_image(str(folder / app / "firmware.elf"))
     cycles = {name: window.cycles for name, window in run_measures(images["latency"]).items()}
@@ -128,7 +128,7 @@ def on_dspic(folder: Path) -> dict[str, Any]:
         "smallest flash": sum(piece.rom for piece in pieces(images["smallest"])),
         "A": alone["A"],
         "pcb": round(equation["B"]) - 128,
-        **frames(images["frames"]),
+        **frames(images["saved_frames"]),
         "objects": [round(equation[name]) for name in "CDE"],
         "switch": cycles["preemptive switch, 2 ready threads"],
         "yield": cycles["Sys_Yield to a yielded thread"],
@@ -139,7 +139,7 @@ def on_dspic(folder: Path) -> dict[str, Any]:
 
 
 def frames(image: Image) -> dict[str, int]:
-    """Return the bytes of saved frames, read from the stacks of the threads of bench/c/frames."""
+    """Return the bytes of saved frames, read from the stacks of the threads of bench/c/saved_frames."""
     target = Target(image, "main", "auto")
     machine, found = target.machine, {}
     for kind, entry, saved in (("preempted", "_T2Interrupt", "os_slice_end"), ("yielded", "hal_yield", "os_yield")):

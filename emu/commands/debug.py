@@ -10,7 +10,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any, Final, cast
 
 from emu.boards import BOARDS
-from emu.commands import kilobot
+from emu.commands import kilobot_board
 from emu.commands.board_options import add_board_options, board_of, set_up
 from emu.host.command import CommandError, Parser, port, seconds
 from emu.host.exit_status import BAD_INPUT, DONE
@@ -71,8 +71,8 @@ def parser() -> Parser:
         action="store_true",
         help="strict mode as for `emu run`: null pointers and uninitialised reads are faults",
     )
-    add_board_options(made, (*BOARDS, kilobot.BOARD))
-    kilobot.add_options(made)
+    add_board_options(made, (*BOARDS, kilobot_board.BOARD))
+    kilobot_board.add_options(made)
     return made
 
 
@@ -107,10 +107,10 @@ def _run_prompt(options: argparse.Namespace) -> int:
 
     if options.port is not None or options.once:
         raise CommandError("--port and --once cannot be used with --tui")
-    if options.board == kilobot.BOARD:
-        machine = cast("Machine", kilobot.debugged(options, parser()))
+    if options.board == kilobot_board.BOARD:
+        machine = cast("Machine", kilobot_board.debugged(options, parser()))
     else:
-        kilobot.refuse_options(options)
+        kilobot_board.refuse_options(options)
         machine = emu.load(options.tui, board=board_of(options), engine=options.engine, strict=options.strict)
         set_up(machine, options)
     limit = options.seconds or (None if sys.stdin.isatty() else SCRIPT_SECONDS)
@@ -152,7 +152,7 @@ def _refuse_options_of_the_prompt(options: argparse.Namespace) -> None:
     """Raise CommandError for a command-line option that an editor sets in its launch configuration."""
     made = parser()
     for name in ("color", "engine", "strict", "seconds", "board", "crystal", "selector", "camera", "sensor", "stimulus",
-                 *kilobot.OWN):  # fmt: skip
+                 *kilobot_board.OWN):  # fmt: skip
         if getattr(options, name) != made.get_default(name):
             raise CommandError(f"--{name} needs --tui; for an editor, set `{name}` in the launch configuration")
 
@@ -184,11 +184,11 @@ def machine_of(arguments: dict[str, Any]) -> Machine:
     if not program:
         raise ValueError("launch needs `program`, the path of an ELF file")
     board: Any = arguments.get("board", BOARDS[0])
-    if board == kilobot.BOARD:
+    if board == kilobot_board.BOARD:
         other = [name for name in ("selector", "camera", "engine", "strict") if arguments.get(name)]
         if other:
             raise ValueError(f"`{other[0]}` does not apply to the board {board}")
-        return cast("Machine", kilobot.debugged_image(program))
+        return cast("Machine", kilobot_board.debugged_image(program))
     if board == BOARDS[0]:
         from emu.boards.epuck.board import Epuck
 

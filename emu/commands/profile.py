@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from emu.boards import BOARDS
-from emu.commands import kilobot
+from emu.commands import kilobot_board
 from emu.commands.board_options import add_board_options, board_of, set_up
 from emu.commands.image_option import add_chip_option, image_of
 from emu.host.command import CommandError, Parser, count, seconds
@@ -60,8 +60,8 @@ def parser() -> Parser:
     made.add_argument("--speedscope", metavar="FILE", help="write a timeline for speedscope")
     made.add_argument("--perfetto", metavar="FILE", help="write a timeline for Perfetto (Trace Event Format)")
     made.add_argument("--json", action="store_true", help="print one JSON object: cycles and percent")
-    add_board_options(made, (*BOARDS, kilobot.BOARD))
-    kilobot.add_options(made)
+    add_board_options(made, (*BOARDS, kilobot_board.BOARD))
+    kilobot_board.add_options(made)
     return made
 
 
@@ -74,13 +74,13 @@ def _group(text: str) -> tuple[str, list[str]]:
 
 def run(options: argparse.Namespace) -> int:
     """Run the command. Return the exit status as listed in DESCRIPTION."""
-    if options.board == kilobot.BOARD:
-        profile, locations = kilobot.profile_of(options, parser())
+    if options.board == kilobot_board.BOARD:
+        profile, locations = kilobot_board.profile_of(options, parser())
         _check_groups(profile, options.group)
         if options.callgrind:
             _write_callgrind(profile, options, locations.at)
         return _finish(profile, options)
-    kilobot.refuse_options(options)
+    kilobot_board.refuse_options(options)
     from emu.api import Machine
 
     image = image_of(options)

@@ -13,7 +13,7 @@ from fractions import Fraction
 from typing import TYPE_CHECKING, Any, Final, TextIO
 
 from emu.boards import BOARDS
-from emu.commands import kilobot
+from emu.commands import kilobot_board
 from emu.commands.board_options import add_board_options, add_watch_option, board_of, links_of, set_up, start_watch
 from emu.commands.image_option import add_chip_option, image_of
 from emu.host.command import CommandError, Parser, cycles, seconds
@@ -95,8 +95,8 @@ def parser() -> Parser:
         metavar="PLACE",
         help="print the native code compiled for a function or address (0x...), with its source instructions",
     )
-    add_board_options(made, (*BOARDS, kilobot.BOARD))
-    kilobot.add_options(made)
+    add_board_options(made, (*BOARDS, kilobot_board.BOARD))
+    kilobot_board.add_options(made)
     add_watch_option(made)
     return made
 
@@ -113,9 +113,9 @@ class RunResult:
 
 def run(options: argparse.Namespace) -> int:
     """Run the command. Return the exit status as listed in DESCRIPTION."""
-    if options.board == kilobot.BOARD:
-        return kilobot.run(options, parser())
-    kilobot.refuse_options(options)
+    if options.board == kilobot_board.BOARD:
+        return kilobot_board.run(options, parser())
+    kilobot_board.refuse_options(options)
     if options.json and options.dump_native:
         raise CommandError("only one of --dump-native and --json can use standard output")
     image = image_of(options)

@@ -13,14 +13,14 @@ from typing import TYPE_CHECKING, Final, cast
 
 from emu.dap.breakpoints import Breakpoint
 from emu.dap.logged_writes import can_log_writes, logged_writes, site_of
-from emu.debug.expressions.filters import filter_of
+from emu.debug.expressions.condition_filters import filter_of
 from emu.debug.history import History
 from emu.debug.inspector import Frame, Inspector
 from emu.debug.processor import Processor
 from emu.debug.threads import Thread, Threads
 from emu.image.lines import SourceLine
 from emu.machine.stops import CHANGED, SLEEP_CYCLES, STILL_ASLEEP
-from emu.system.filters import Filter
+from emu.system.hook_filters import Filter
 
 if TYPE_CHECKING:
     from emu.debug.avr.machine import DebuggedKilobot

@@ -28,7 +28,7 @@ from emu.debug.replay import ExecutionTrace, retrace, sandboxed
 from emu.debug.threads import Threads
 from emu.dspic30f.exceptions.faults import RESTART
 from emu.dspic30f.isa.codec import decode_for_execution
-from emu.dspic30f.isa.debug import FAILED_CHECK, PLAIN_TRAP
+from emu.dspic30f.isa.debugger_words import FAILED_CHECK, PLAIN_TRAP
 from emu.dspic30f.state.state import IPL3, STACK_POINTER
 from emu.image.model import ERASED
 from emu.image.symbols import STOP_FUNCTION

@@ -19,7 +19,7 @@ import numpy.typing as npt
 
 from emu.dspic30f.core import ONE_INSTRUMENT, Core
 from emu.dspic30f.state.state import RUN
-from emu.system.filters import Filter
+from emu.system.hook_filters import Filter
 
 COUNT, SEEN = 0, 1
 """Words of the log: number of entries; the last seen values, one word for each watched number. Entries follow."""

@@ -7,7 +7,7 @@ from types import MappingProxyType
 from typing import Any, Final, Protocol
 
 from emu.dspic30f.core import Core
-from emu.system.filters import Filter
+from emu.system.hook_filters import Filter
 from emu.system.native_handle import Native, Run
 
 NAMES: Final = ("auto", "jit", "plain")

@@ -9,8 +9,8 @@ from __future__ import annotations
 from array import array
 
 from emu.chips.chip import Chip
+from emu.image.chip_fit import misfits
 from emu.image.elf_facts import OCTETS_PER_WORD, UNITS_PER_WORD
-from emu.image.fitness import misfits
 from emu.image.model import ERASED, LOADABLE, Block, Image, LoadError, check_blocks
 
 DATA, END, SEGMENT, START_SEGMENT, LINEAR, START_LINEAR = range(6)

@@ -9,7 +9,7 @@ from emu.dspic30f.change_log import ChangeLog, Entries, Watched
 
 if TYPE_CHECKING:
     from emu.machine.machine import Machine
-    from emu.system.filters import Filter
+    from emu.system.hook_filters import Filter
 
 
 def is_in_ram(machine: Machine, address: int, size: int) -> bool:

@@ -1,7 +1,7 @@
 """Runs until a C condition holds, with the condition compiled to native code where possible.
 
 Input: a machine, its inspector, a condition. Output: the stop. A condition at a place is the filter of a hook
-(emu/debug/expressions/filters.py). A condition without a place is compared after each store to its variables.
+(emu/debug/expressions/condition_filters.py). A condition without a place is compared after each store to its variables.
 """
 
 from __future__ import annotations
@@ -10,8 +10,8 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from emu.debug.dwarf.location import Unavailable
+from emu.debug.expressions.condition_filters import filter_of
 from emu.debug.expressions.expression import ExpressionError, evaluate, number_of
-from emu.debug.expressions.filters import filter_of
 from emu.dspic30f.change_log import Entries, WatchedNumber
 from emu.instruments.changes import is_in_ram, log_changes
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from emu.debug.inspector import Frame, Inspector
     from emu.machine.machine import Machine
     from emu.machine.stops import Stop
-    from emu.system.filters import Filter
+    from emu.system.hook_filters import Filter
 
 
 def run_to_place(machine: Machine, inspector: Inspector, address: int, condition: str, limit: int) -> Stop:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Final
 
-from emu.system.filters import Filter
+from emu.system.hook_filters import Filter
 
 PcHook = Callable[[], bool | None]
 

@@ -20,8 +20,8 @@ if TYPE_CHECKING:
     from re import Match
 
     from emu.debug.threads import Thread
+    from emu.peripherals.uart.expect import Pattern
     from emu.peripherals.uart.uart import Uart
-    from emu.peripherals.wait import Pattern
     from emu.profile.cycle_shares import Profile, Profiler
 
 MILLISECONDS: Final = 1000
@@ -221,7 +221,7 @@ class Robot:
 
     def watched(self, work: Any) -> Any:
         """Call `work`, which runs the machine, and return its result. Raises FirmwareFault if a fault ends it."""
-        from emu.peripherals.wait import ExpectError
+        from emu.peripherals.uart.expect import ExpectError
 
         try:
             done = work()

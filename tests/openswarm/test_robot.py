@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 import emu
-from emu.peripherals.wait import ExpectError
+from emu.peripherals.uart.expect import ExpectError
 from openswarm.testing.robot import FirmwareFault, Robot
 
 PROGRAM = """

@@ -11,7 +11,7 @@ from toolchain.arguments import definition
 from toolchain.asm.assemble import assemble
 from toolchain.asm.state import Options
 from toolchain.commands.parser import parser
-from toolchain.device import DEFAULT, DEVICES, device
+from toolchain.device_names import DEFAULT, DEVICES, device
 from toolchain.elf.write import object_bytes
 from toolchain.errors import ToolError
 from toolchain.files import read_text, write_outputs

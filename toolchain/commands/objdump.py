@@ -5,13 +5,13 @@ from __future__ import annotations
 import argparse
 
 from emu.image.elf_facts import RELOCATIONS, SectionFlag
-from toolchain.commands.names import letter
+from toolchain.commands.nm import letter
 from toolchain.commands.parser import parser
 from toolchain.elf import constants as c
 from toolchain.elf.disassemble import CodeItem, Names, items, text_of
-from toolchain.elf.dwarf import LineTable, SourceText, lines_of
 from toolchain.elf.model import Executable, Home, ObjectFile, Section
 from toolchain.elf.read import is_object, read_executable, read_object
+from toolchain.elf.source_lines import LineTable, SourceText, lines_of
 from toolchain.errors import ToolError
 from toolchain.files import read_bytes
 

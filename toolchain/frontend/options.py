@@ -15,7 +15,7 @@ from pathlib import Path
 from emu.chips import chip_named
 from emu.chips.chip import Chip
 from emu.host.files import read_file
-from toolchain.device import device
+from toolchain.device_names import device
 from toolchain.errors import ToolError
 from toolchain.frontend.option_table import CLANG, IGNORED, REFUSED, OptionRow, row_of
 

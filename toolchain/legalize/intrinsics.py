@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from emu.dspic30f.isa.debug import PLAIN_TRAP
+from emu.dspic30f.isa.debugger_words import PLAIN_TRAP
 from toolchain.ir.build import const, legal_type
 from toolchain.ir.model import I1, I8, I16, I32, VOID, ConstInt, GlobalRef, Instr, UnsupportedError, Value, int_type
 from toolchain.legalize import mathlib, softfloat

@@ -10,7 +10,7 @@ from typing import NoReturn
 
 from emu.chips.chip import Chip, Region
 from toolchain.arguments import definition, integer
-from toolchain.device import DEFAULT, DEVICES, device
+from toolchain.device_names import DEFAULT, DEVICES, device
 from toolchain.elf.archive import MAGIC, Archive, open_archive
 from toolchain.elf.read import read_object
 from toolchain.elf.write import executable_bytes

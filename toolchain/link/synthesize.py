@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from emu.chips.family import SLOTS
 from emu.dspic30f.isa import text
-from emu.dspic30f.isa.debug import HALT
+from emu.dspic30f.isa.debugger_words import HALT
 from emu.image.elf_facts import OCTETS_PER_WORD, RELOCATION_BY_NAME, RELOCATIONS, Formula, SectionFlag
 from toolchain.elf.model import Bind, Home, ObjectFile, Reloc, Section, Symbol
 from toolchain.link.resolve import Resolution

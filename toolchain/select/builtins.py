@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from emu.dspic30f.isa.debug import FAILED_CHECK, HALT
+from emu.dspic30f.isa.debugger_words import FAILED_CHECK, HALT
 from toolchain.abi.names import symbol
 from toolchain.ir.model import ConstInt, GlobalRef, Instr, UnsupportedError
 from toolchain.mir.operands import Imm, Mem

@@ -1,4 +1,4 @@
-"""Operands in memory: addressing modes, and loads that fold into their users."""
+"""Selection context of one function: its state, and operands in memory (addressing modes, foldable loads)."""
 
 from __future__ import annotations
 

@@ -191,7 +191,7 @@ def _controllers(scene: Scene, options: argparse.Namespace, home: Path) -> tuple
     for name, file, folder in wanted:
         if file in ("", *SPEED_TABLES):
             continue
-        from arena.robots.own_controller import controller_file  # imported here: it loads the emulator's sensors
+        from arena.robots.user_controller import controller_file  # imported here: it loads the emulator's sensors
 
         path = controller_file(file, folder)
         if found.setdefault(name, path) != path:

@@ -33,7 +33,7 @@ from emu.dspic30f.interpreter import flow_rules
 from emu.dspic30f.interpreter.plain import Interpreter
 from emu.dspic30f.interpreter.rule_paths import function_of
 from emu.dspic30f.isa.codec import decode_for_execution
-from emu.dspic30f.isa.debug import is_debug_word
+from emu.dspic30f.isa.debugger_words import is_debug_word
 from emu.dspic30f.isa.facts import Facts, facts_of
 from emu.dspic30f.isa.flow import (
     Branch,

@@ -13,7 +13,7 @@ from emu.dspic30f.isa.builder import Context
 from emu.dspic30f.state.data_space import W_END
 from emu.dspic30f.state.modes import REGISTERS, Key
 from emu.system.arrivals import Recording
-from emu.system.filters import Filter
+from emu.system.hook_filters import Filter
 from emu.system.rules import Rule
 
 SfrAccess = Literal["plain", "slow", "irq", "flags", "sr"]

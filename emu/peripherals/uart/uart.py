@@ -17,6 +17,7 @@ from emu.peripherals.interrupt_lines import Interrupts
 from emu.peripherals.pins import parse_pin
 from emu.peripherals.ports.ports import Port
 from emu.peripherals.timers.input_capture import Capture
+from emu.peripherals.uart.expect import OutputMatcher, Pattern
 from emu.peripherals.uart.frame import first_stop, has_parity, length, pack, sample, stops
 from emu.peripherals.uart.rules import (
     CHARACTER,
@@ -40,7 +41,6 @@ from emu.peripherals.uart.rules import (
 )
 from emu.peripherals.uart.rx_queue import BREAK, FRAMING_ERROR, PARITY_ERROR, WAIT_FOR_RECEIVER, QueuedFrame, RxQueue
 from emu.peripherals.uart.tx_pin import TxPin
-from emu.peripherals.wait import OutputMatcher, Pattern
 from emu.system.events import NEVER
 from emu.system.observers import Listeners
 from emu.system.rules import Rule, cell_of, event_slot

@@ -11,7 +11,7 @@ import emu
 from emu.debug.dwarf.location import Unavailable
 from emu.debug.function_call import CallError
 from emu.debug.history import History
-from emu.peripherals.wait import ExpectError
+from emu.peripherals.uart.expect import ExpectError
 from toolchain.driver import driver
 
 PROGRAM = """

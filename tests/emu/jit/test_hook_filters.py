@@ -11,8 +11,8 @@ from emu.dap import debuggee
 from emu.dap.breakpoints import Breakpoint
 from emu.dap.debuggee import Debuggee
 from emu.dap.logged_writes import can_log_writes
+from emu.debug.expressions.condition_filters import filter_of
 from emu.debug.expressions.expression import evaluate, number_of
-from emu.debug.expressions.filters import filter_of
 from emu.debug.history import History
 from emu.dspic30f.jit.engine import JitEngine
 from toolchain.driver import driver

@@ -7,7 +7,7 @@ import random
 import pytest
 
 from .conftest import Rig
-from .plain_adc import difference
+from .reference_adc import difference
 
 ADON, ASAM, SAMP, DONE = 0x8000, 4, 2, 1
 AUTO, TIMER3, INT0 = 7 << 5, 2 << 5, 1 << 5

@@ -18,7 +18,6 @@ from tests.firmware.contracts import CALL, HEADERS, callers
 from tests.firmware.model import kernel as _kernel  # noqa: F401  (its import declares every call)
 from tests.firmware.model.calls import CALLS
 from tests.firmware.model.compare import Kernels, build, random_programs
-from tests.firmware.model.faults import FAULTS, FOUND_BY, plant
 from tests.firmware.model.generator import MOST_CALLS, Generator
 from tests.firmware.model.on_target import (
     DEFINES,
@@ -29,6 +28,7 @@ from tests.firmware.model.on_target import (
     KilobotCpu,
     Robot,
 )
+from tests.firmware.model.planted_faults import FAULTS, FOUND_BY, plant
 from tests.firmware.model.program import Program, named_texts
 from tests.firmware.ports.targets import BOARDS, in_qemu, kilobot, make
 from tests.fuzz.seeds import base_seed

@@ -21,7 +21,7 @@ from tests.firmware.ports.emulated_kilobots import EmulatedKilobots
 from tests.firmware.ports.targets import make
 
 MESSAGE, EVENT = 1, 2
-"""Values of the firmware variable `wanted` (target/pulses): send a message, send an event."""
+"""Values of the firmware variable `wanted` (target/kilobot_infrared): send a message, send an event."""
 STATISTICS = ("sent", "received", "damaged", "false_starts", "adaptations", "refused", "conflicts")
 LIFETIME_S = 7.0
 STRENGTH_OF_LOW_GAIN = 1024
@@ -34,7 +34,7 @@ Open = Callable[..., Any]
 
 @pytest.fixture(scope="module")
 def image(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return make("kilobot", "pulses", tmp_path_factory.mktemp("pulses"), apps=TARGET_APPS)
+    return make("kilobot", "kilobot_infrared", tmp_path_factory.mktemp("pulses"), apps=TARGET_APPS)
 
 
 @pytest.fixture(params=SIMULATORS)

@@ -19,7 +19,7 @@ from openswarm.cli import main
 from openswarm.flashing.boot_session import BootSession
 from openswarm.flashing.loaders import LOADERS, ROW_UNITS, block
 from openswarm.flashing.rows import goto, rows
-from tests.firmware.radio import SLICE, Line
+from tests.firmware.bluetooth_connection import SLICE, Line
 from tests.json_schemas import validated
 
 LOADER = LOADERS[0x91]

@@ -22,7 +22,7 @@ from openswarm.flashing.messages import Advertisement, framed, unframed
 from openswarm.flashing.program import SLOT, Program, program_of
 from openswarm.flashing.rows import rows
 from openswarm.flashing.spreading import HostNeighbour
-from tests.firmware.radio import SLICE, Line
+from tests.firmware.bluetooth_connection import SLICE, Line
 from tests.json_schemas import validated
 
 ROWS = 3

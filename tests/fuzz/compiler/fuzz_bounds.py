@@ -5,7 +5,7 @@ computes.
 that exceeds a bound. Generators of the programs, by seed:
 - `c_shapes.py`: interrupts, escaping addresses, volatile, large frames, loops with fixed counts; every second program
   also contains `c_features.py`, which often makes it unbounded;
-- `c_notes.py`, every third seed: programs that are bounded only by their annotations;
+- `c_annotations.py`, every third seed: programs that are bounded only by their annotations;
 - `c_interrupts.py`, every sixth seed: responses of interrupts, and the stack under nested interrupts, are compared at
   many phases.
 
@@ -27,7 +27,7 @@ sys.path.insert(0, str(ROOT))
 import emu  # noqa: E402
 from emu.system.events import NEVER  # noqa: E402
 from tests.fuzz.compiler.fuzz_compiler import NO_ROOM  # noqa: E402
-from tests.fuzz.programs import c_interrupts, c_notes, c_shapes  # noqa: E402
+from tests.fuzz.programs import c_annotations, c_interrupts, c_shapes  # noqa: E402
 from tests.fuzz.seeds import Campaign, parser  # noqa: E402
 from tests.toolchain.bounds.responses import Watched, watched  # noqa: E402
 from tests.toolchain.c_programs import build  # noqa: E402
@@ -108,7 +108,7 @@ def examine(seed: int, folder: Path) -> tuple[str, dict[str, tuple[Seen, Bound]]
     """Test one program at one level. Return its outcome, and the measured maxima and the bound of each function."""
     level = LEVELS[seed % len(LEVELS)]
     noted = seed % 3 == NOTED
-    files = c_notes.Program(seed).files if noted else c_shapes.Program(seed, has_features=seed % 2 == 1).files
+    files = c_annotations.Program(seed).files if noted else c_shapes.Program(seed, has_features=seed % 2 == 1).files
     for name, text in files.items():
         (folder / name).write_text(text)
     image = folder / "program.elf"

@@ -18,7 +18,7 @@ ROOT = Path(__file__).resolve().parents[3]
 sys.path.insert(0, str(ROOT))
 
 from tests.emu.peripherals.conftest import Rig  # noqa: E402
-from tests.emu.peripherals.plain_adc import difference  # noqa: E402
+from tests.emu.peripherals.reference_adc import difference  # noqa: E402
 from tests.emu.peripherals.test_fuzz import WORDS, act, contradictions  # noqa: E402
 from tests.fuzz.seeds import Campaign, parser  # noqa: E402
 

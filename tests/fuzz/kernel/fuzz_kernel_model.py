@@ -18,7 +18,7 @@ ROOT = Path(__file__).resolve().parents[3]
 sys.path.insert(0, str(ROOT))
 
 from tests.firmware.model.compare import Kernels, build, random_programs  # noqa: E402
-from tests.firmware.model.faults import find_all  # noqa: E402
+from tests.firmware.model.planted_faults import find_all  # noqa: E402
 from tests.fuzz.seeds import SKIPPED, Campaign, parser  # noqa: E402
 
 PROGRAMS = 500

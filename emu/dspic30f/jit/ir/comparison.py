@@ -7,7 +7,7 @@ from operator import eq, ge, gt, le, lt, ne
 from typing import Any, Final
 
 from emu.dspic30f.jit.ir.values import Number
-from emu.system.filters import Comparison
+from emu.system.hook_filters import Comparison
 
 _COMPARE: Final[dict[str, Callable[[Any, Any], Any]]] = {"==": eq, "!=": ne, "<": lt, "<=": le, ">": gt, ">=": ge}
 

@@ -33,8 +33,8 @@ from emu.dspic30f.jit.ir.values import Emitter, Number, Value, truth, wide
 from emu.dspic30f.jit.ir.variables import pointer
 from emu.dspic30f.jit.machine_layout import MachineLayout
 from emu.dspic30f.jit.translate.arrivals import ArrivalRecorder
-from emu.dspic30f.jit.translate.filters import some_filter_holds
 from emu.dspic30f.jit.translate.frame import FunctionFrame
+from emu.dspic30f.jit.translate.hook_filters import some_filter_holds
 from emu.dspic30f.jit.translate.polling import empty_loops
 from emu.dspic30f.jit.translate.region import Region, Step
 from emu.dspic30f.jit.translate.repeat import RepeatTranslator

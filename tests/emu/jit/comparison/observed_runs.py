@@ -30,7 +30,7 @@ from emu.instruments.vcd import WaveformRecorder
 from emu.machine.machine import Machine
 from emu.machine.stops import Stop
 from emu.system.arrivals import ArrivalLog, LoggedNumber
-from emu.system.filters import OPERATORS, Comparison
+from emu.system.hook_filters import OPERATORS, Comparison
 from tests.emu.jit.comparison.engine_pair import NO_WATCHDOG, Difference, QuickCompiler
 from tests.emu.jit.comparison.random_firmware import BODY_WORDS, CODE, load, random_firmware
 

@@ -1,4 +1,4 @@
-"""Filters of hooks as LLVM IR (emu/system/filters.py).
+"""Filters of hooks as LLVM IR (emu/system/hook_filters.py).
 
 Where native code cannot read a number as Python does, the filter counts as true, and the hook is called. This concerns
 registers without a rule that computes them, and device registers while an event is due in the present cycle.
@@ -15,7 +15,7 @@ from emu.dspic30f.jit.ir.values import Number, truth
 from emu.dspic30f.jit.ir.variables import pointer
 from emu.dspic30f.jit.translate.frame import FunctionFrame
 from emu.dspic30f.state.data_space import W_END
-from emu.system.filters import Comparison, Filter
+from emu.system.hook_filters import Comparison, Filter
 
 
 def some_filter_holds(f: FunctionFrame, filters: tuple[Filter, ...], calls: str) -> Number:

@@ -217,7 +217,7 @@ def test_a_loop_with_too_many_iterations_is_reported(tmp_path: Path, capsys) -> 
 def test_programs_with_correct_annotations_of_every_kind_stay_within_their_bounds(tmp_path: Path, seed: int) -> None:
     """Programs with correct annotations of every kind stay within their bounds.
 
-    Sample of tests/fuzz/compiler/fuzz_bounds.py with programs of tests/fuzz/programs/c_notes.py.
+    Sample of tests/fuzz/compiler/fuzz_bounds.py with programs of tests/fuzz/programs/c_annotations.py.
     """
     outcome, _ = examine(seed, tmp_path)
     assert outcome == "bounded"

@@ -1,4 +1,4 @@
-"""Filters of conditional breakpoints: conditions that native code can evaluate (emu/system/filters.py).
+"""Filters of conditional breakpoints: conditions that native code can evaluate (emu/system/hook_filters.py).
 
 A conjunction of comparisons of numbers with constants becomes a filter. A number is a variable, a member, an element at
 a constant index, a W register, an SFR or a field of one. Every other condition is evaluated by `expression.evaluate` at
@@ -14,7 +14,7 @@ from emu.debug.dwarf.location import Unavailable
 from emu.debug.expressions.expression import ExpressionError, evaluate, tokens
 from emu.debug.inspector import Frame, Inspector, Value
 from emu.debug.unwind import REGISTERS
-from emu.system.filters import OPERATORS, Comparison, Filter
+from emu.system.hook_filters import OPERATORS, Comparison, Filter
 
 _MIRRORED: Final = {"<": ">", "<=": ">=", ">": "<", ">=": "<="}
 _INT_BITS: Final = 16

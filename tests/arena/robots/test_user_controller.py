@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from arena.cli import main
-from arena.robots.own_controller import Policy, load_controller
+from arena.robots.user_controller import Policy, load_controller
 from arena.scene.loader import SceneError, load_scene
 from arena.trial.record import read_trial
 
