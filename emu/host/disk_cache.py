@@ -1,6 +1,6 @@
 """Cache folders on disk: one file per object, named by the hash of all inputs that determine its content.
 
-A file is a checksum followed by the content. Several processes may share the folder. A file appears by an atomic
+A file is a keyed checksum followed by the content. Several processes may share the folder. A file appears by an atomic
 rename; a short, damaged or foreign file counts as absent.
 
 The size of the folder is limited. The first two digits of a name are a subfolder, called shelf, and all shelves have
@@ -17,9 +17,9 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Final
 
+from emu.host.keyed_checksum import content_of, with_checksum
 from emu.host.private_folder import is_usable, make_private
 
-CHECKSUM_BYTES: Final = 32
 SHELVES: Final = 256
 
 
@@ -55,10 +55,8 @@ class DiskCache:
             return None
         with suppress(OSError):
             os.utime(path)
-        checksum, content = blob[:CHECKSUM_BYTES], blob[CHECKSUM_BYTES:]
-        if hashlib.sha256(content).digest() != checksum:
-            return None
-        self.hits += 1
+        content = content_of(self.where, key, blob)
+        self.hits += content is not None
         return content
 
     def put(self, key: str, content: bytes) -> None:
@@ -68,10 +66,11 @@ class DiskCache:
             make_private(parent)
             if not is_usable(self.where.parent, self.where, parent):
                 return
+            blob = with_checksum(self.where, key, content)
             handle, name = tempfile.mkstemp(dir=parent)
             try:
                 with os.fdopen(handle, "wb") as file:
-                    file.write(hashlib.sha256(content).digest() + content)
+                    file.write(blob)
                 os.replace(name, parent / key)
             except OSError:
                 os.unlink(name)  # half a file on a full disk

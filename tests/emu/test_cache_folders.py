@@ -62,6 +62,27 @@ def test_all_new_folders_are_private(cache: Path) -> None:
     assert objects.get("00key") == b"code"
 
 
+def test_an_entry_of_another_cache_or_name_is_not_used(cache: Path) -> None:
+    """An object counts as absent under another name, beside another key or without one; the key is private."""
+    objects = fill(cache)
+    shelf, key = cache / "jit" / "00", cache / "jit" / "key"
+    assert stat.S_IMODE(key.stat().st_mode) == 0o600
+    (shelf / "00other").write_bytes((shelf / "00key").read_bytes())
+    assert objects.get("00other") is None
+    foreign = ObjectCache(cache.parent / "foreign" / "jit")
+    foreign.put("00key", b"planted")
+    (shelf / "00key").write_bytes((foreign.where / "00" / "00key").read_bytes())
+    assert objects.get("00key") is None
+    objects.put("00key", b"code")
+    assert objects.get("00key") == b"code"
+    key.write_bytes(b"short")
+    assert objects.get("00key") is None
+    objects.put("00key", b"again")
+    assert (objects.get("00key"), len(key.read_bytes())) == (b"again", 32)
+    key.unlink()
+    assert objects.get("00key") is None
+
+
 @needs_full_device
 def test_a_full_disk_leaves_no_half_written_object(cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """An object that does not fit is not stored, and no part of it remains."""
@@ -91,7 +112,7 @@ def test_a_folder_that_others_can_write_is_not_used(
     objects = ObjectCache()
     assert (objects.get("00key") is None) == (place != "toolchain")
     objects.put("00other", b"code")
-    archive = next((cache / "toolchain").iterdir())
+    archive = next((cache / "toolchain").glob("*.a"))
     assert (runtime_archive._stored(archive) is None) == (place in ("", "toolchain"))
     said = capsys.readouterr().err
     assert said.count("\n") == 1
@@ -129,7 +150,7 @@ def test_a_command_works_without_an_unsafe_cache(cache: Path, tmp_path: Path) ->
 def test_a_damaged_runtime_library_counts_as_absent(cache: Path, damaged: tuple[bytes, int, int | None]) -> None:
     """A truncated, empty, extended or shifted run-time library fails its checksum and is ignored."""
     fill(cache)
-    (archive,) = (cache / "toolchain").iterdir()
+    (archive,) = (cache / "toolchain").glob("*.a")
     assert runtime_archive._stored(archive) == ARCHIVE
     added, first, end = damaged
     archive.write_bytes(archive.read_bytes()[first:end] + added)

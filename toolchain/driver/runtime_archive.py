@@ -1,7 +1,7 @@
 """The run-time library as an archive, built from `runtime/` on first use and cached in the user's cache folder.
 
 The name of the cached file is a hash of all dependencies of the archive. The file is created by a rename, so concurrent
-builds are safe. It is a checksum followed by the archive; a damaged file counts as absent.
+builds are safe. It is a keyed checksum followed by the archive; a damaged file counts as absent.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from functools import cache, partial
 from importlib.util import find_spec
 from pathlib import Path
 
+from emu.host.keyed_checksum import content_of, with_checksum
 from emu.host.paths import runtime_libraries
 from emu.host.private_folder import is_usable, make_private
 from toolchain.frontend.options import CcOptions, Input
@@ -29,7 +30,6 @@ UNRELATED = (
 )  # fmt: skip
 SUFFIXES = (".py", ".c", ".cpp", ".h", ".s", ".inc", ".csv")
 LEVEL = "s"
-CHECKSUM_BYTES = 32
 SHORT_DOUBLE_VARIANTS = ("format.s", "scan.c", "scan_stream.c")
 """Sources with a variant for programs whose double has 32 bits."""
 LANGUAGES = {".c": "c", ".cpp": "c++", ".s": "assembler"}
@@ -165,8 +165,7 @@ def _stored(path: Path) -> bytes | None:
         blob = path.read_bytes() if is_usable(path.parent.parent, path.parent) else b""
     except OSError:
         return None
-    checksum, content = blob[:CHECKSUM_BYTES], blob[CHECKSUM_BYTES:]
-    return content if hashlib.sha256(content).digest() == checksum else None
+    return content_of(path.parent, path.name, blob)
 
 
 def _store(path: Path, content: bytes) -> None:
@@ -175,9 +174,10 @@ def _store(path: Path, content: bytes) -> None:
         make_private(path.parent)
         if not is_usable(path.parent.parent, path.parent):
             return
+        blob = with_checksum(path.parent, path.name, content)
         handle, temporary = tempfile.mkstemp(prefix=".libdspic.", dir=path.parent)
         with os.fdopen(handle, "wb") as stream:
-            stream.write(hashlib.sha256(content).digest() + content)
+            stream.write(blob)
         os.replace(temporary, path)
         for old in sorted(path.parent.glob("libdspic-*.a"), key=lambda p: p.stat().st_mtime)[:-8]:
             old.unlink(missing_ok=True)
