@@ -198,7 +198,7 @@ class Debuggee:
 
     def _event_of_change(self, one: Breakpoint) -> StopEvent | None:
         """Return the event for a change of watched bytes; None if the data breakpoint continues."""
-        place = self.inspector.where(self._kilobot.last_site)
+        place = self.inspector.where(self._kilobot.last_address)
         ids = (one.id,) if one.should_stop(self.inspector, self._write_output) else ()
         return StopEvent("data breakpoint", f"write at {place}", ids) if ids else None
 

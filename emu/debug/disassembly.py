@@ -35,7 +35,7 @@ def _name(image: Image, address: int, space: str) -> str | None:
         return image.symbols.text(address) if image.symbols.code(address) else None
     if address in image.chip.data["sfr"]:
         return image.register_names.get(address)
-    found = image.symbols.data(address)
+    found = image.symbols.variable_at(address)
     if found is None:
         return None
     symbol, distance = found

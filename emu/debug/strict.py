@@ -117,7 +117,7 @@ class StrictMode:
     def _symbol(self, address: int) -> str:
         """Return the variable at `address` as text ` (name+offset)`, empty if there is none."""
         image = self._machine.image
-        found = image.symbols.data(address) if image is not None else None
+        found = image.symbols.variable_at(address) if image is not None else None
         if found is None:
             return ""
         symbol, distance = found

@@ -69,7 +69,7 @@ class Symbols:
         """
         return self._code.below(pc)
 
-    def data(self, address: int) -> tuple[Symbol, int] | None:
+    def variable_at(self, address: int) -> tuple[Symbol, int] | None:
         """Return the variable that contains a data address, and the distance from its start in bytes."""
         found = self._data.below(address)
         return found if found and (found[1] == 0 or found[1] < found[0].size) else None

@@ -108,5 +108,5 @@ def _skip(machine: Machine) -> str:
 
 
 def _variable(machine: Machine, address: int) -> str:
-    symbol = Inspector(machine).image.symbols.data(address)
+    symbol = Inspector(machine).image.symbols.variable_at(address)
     return f" ({symbol[0].name.removeprefix('_')}+{symbol[1]})" if symbol is not None else ""

@@ -132,7 +132,7 @@ class CodeListing:
 
     def _is_address(self, value: int) -> bool:
         symbols = self._image.symbols
-        return bool(symbols.labels(value)) or symbols.data(value) is not None
+        return bool(symbols.labels(value)) or symbols.variable_at(value) is not None
 
     def _name(self, address: int) -> str:
         symbol = self._image.symbols.code(address)

@@ -232,7 +232,7 @@ def stores_to(image: Image, address: int) -> list[int] | None:
 
     Return None if the image takes the word's address, so that it may also be stored to through a pointer.
     """
-    found = image.symbols.data(address)
+    found = image.symbols.variable_at(address)
     if found is None:
         return None
     symbol, distance = found

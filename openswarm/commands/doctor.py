@@ -94,7 +94,7 @@ def run(options: argparse.Namespace) -> int:
     """Print the findings; return the exit status."""
     findings = [*packages(), *programs(), cache()]
     if options.tries:
-        findings.append(trial())
+        findings.append(compile_and_run())
     is_whole = all(one.found for one in findings if one.is_needed)
     if options.json:
         about = {
@@ -164,7 +164,7 @@ def cache() -> Finding:
                    "set OPENSWARM_CACHE to a folder that can be written", False)  # fmt: skip
 
 
-def trial() -> Finding:
+def compile_and_run() -> Finding:
     """Compile, link and run one program; return a finding: whether that works."""
     with tempfile.TemporaryDirectory(prefix="openswarm-doctor-") as name:
         source, image = Path(name) / "main.c", Path(name) / "main.elf"

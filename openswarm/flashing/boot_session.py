@@ -71,7 +71,7 @@ class BootSession:
         limit = self._line.now() + seconds
         others = 0
         while True:
-            self._line.drop()
+            self._line.discard_received()
             self._line.write(HELLO)
             heard = self._receive(HELLO_SECONDS)
             if heard[-1:] == DONE and heard[-2:-1]:
@@ -107,7 +107,7 @@ class BootSession:
 
     def _row(self, address: int, data: bytes) -> None:
         for attempt in range(1, TRIES + 1):
-            self._line.drop()
+            self._line.discard_received()
             self._line.write(data)
             self.counts.blocks += 1
             answer = self._answer()

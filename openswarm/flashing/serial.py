@@ -29,7 +29,7 @@ class Line(Protocol):
     def read(self, seconds: float) -> bytes:
         """Return the next byte, or nothing after `seconds`."""
 
-    def drop(self) -> None:
+    def discard_received(self) -> None:
         """Discard received bytes."""
 
     def now(self) -> float:
@@ -105,7 +105,7 @@ class SerialPort:
             raise OSError(f"{self.device} was closed at its other end")
         return byte
 
-    def drop(self) -> None:
+    def discard_received(self) -> None:
         """Discard received bytes. The next write reports a closed port."""
         with contextlib.suppress(termios.error):
             termios.tcflush(self._file, termios.TCIFLUSH)

@@ -61,7 +61,7 @@ class Robot:
     def now(self) -> float:
         return self.time
 
-    def drop(self) -> None:
+    def discard_received(self) -> None:
         self.outbox = [one for one in self.outbox if one[0] > self.time]
 
     def read(self, seconds: float) -> bytes:
@@ -293,7 +293,7 @@ def test_a_port_that_vanishes_or_takes_nothing_is_one_error(monkeypatch):
             port.write(b"row")
         os.close(slave)
         os.close(master)
-        port.drop()
+        port.discard_received()
         with pytest.raises(OSError, match=r"/dev/pts/\d+ is gone: Input/output error"):
             port.write(b"row")
         with pytest.raises(OSError, match="closed at its other end"):

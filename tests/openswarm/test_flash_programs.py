@@ -65,7 +65,7 @@ class Robot:
     def now(self) -> float:
         return self.time
 
-    def drop(self) -> None:
+    def discard_received(self) -> None:
         self.outbox.clear()
 
     def say(self, message: bytes) -> None:

@@ -157,7 +157,7 @@ class InstructionExecution:
                 self.result.peak[key] = top, (self.code.entry,)
 
     def _update_masking(self, state: AbstractState, pc: int) -> None:
-        """Begin or end masked times of levels."""
+        """Begin or end, at `pc`, the time for which interrupts of each level are masked."""
         blocked = state.disi_end > state.time
         if not blocked:
             state.disi_end = 0

@@ -69,10 +69,11 @@ class _RecordFlow:
         self.replaced = self._replaced_records()
 
     def _replaced_records(self) -> dict[int, set[int]]:
-        """By record of a moved value: the records that it replaces.
+        """Map each record of a moved value to the records that it replaces.
 
         The middle end moves a record with its value, even past a later assignment to the variable. At the old place it
-        leaves a record that computes the value from operands. The moved record is valid only where that record is.
+        leaves a record that computes the value from operands. The moved record is valid only where the record
+        left behind is valid.
         """
         by_variable: dict[str, list[int]] = {}
         for k, record in enumerate(self.records):

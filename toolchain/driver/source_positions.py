@@ -58,7 +58,7 @@ def with_positions(error: ToolError, modules: Callable[[], Iterable[str]]) -> To
 
 
 def _located(finding: str, uses: dict[str, list[str]], definitions: dict[str, list[str]]) -> list[str]:
-    """The lines of one finding with the positions that are known."""
+    """Return the message lines of one finding, each with its source position if that is known."""
     if undefined := _UNDEFINED.search(finding):
         cure = undefined[2] or ""
         return [f"{position.split(' ')[0]}: error: undefined symbol {undefined[1]}, {position.split(' ', 1)[1]}{cure}"

@@ -265,7 +265,7 @@ def _changes_of(job: ClangJob) -> list[Change]:
 
 
 def _changes_for(result: subprocess.CompletedProcess[bytes], job: ClangJob) -> list[Change]:
-    """The changes of the text that clang's messages show to be necessary."""
+    """Return the rewrites of the source text that clang's messages ask for."""
     said, failed = result.stderr, result.returncode != 0
     changes: list[Change] = []
     if attributes.IGNORED.search(said):

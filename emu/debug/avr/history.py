@@ -33,7 +33,7 @@ class KilobotHistory(History):
                 new = kilobot.peek_bytes(address, size)
                 if new == old:
                     break
-                found, old = Write(kilobot.last_cycle, kilobot.last_site, old, new), new
+                found, old = Write(kilobot.last_cycle, kilobot.last_address, old, new), new
         return found
 
     @contextmanager

@@ -169,7 +169,7 @@ class DebuggedKilobot:
         return bool(self._machine.state.asleep)
 
     @property
-    def last_site(self) -> int:
+    def last_address(self) -> int:
         """Byte address of the instruction, or of the interrupt's vector, that ran last."""
         return 2 * self._observation.site
 

@@ -25,7 +25,7 @@ _OFF: Final = RegisterWiring(0, 0, _zero, None, None, None)
 
 
 class ModuleDisable(Peripheral):
-    """PMD1 and PMD2. Their values determine which modules are off; `restored` disables the same after a snapshot."""
+    """PMD1 and PMD2. Their bits determine which modules are off; after a restored snapshot `restored` applies them."""
 
     def __init__(self, context: ChipContext, modules: dict[str, Peripheral]) -> None:
         super().__init__("pmd", context)

@@ -15,7 +15,7 @@ typedef struct {
 } footprint_request;
 
 typedef struct {
-    uint16 threads, events, subscriptions, messages; /* created; fewer than requested: no memory */
+    uint16 threads, events, subscriptions, messages; /* created; fewer than requested if memory is full */
     uint16 heap_used, heap_peak;                     /* the allocator's own count, at the last stop */
     uint16 kernel_stack_unused, thread_stack_unused;
 } footprint_result;

@@ -122,7 +122,7 @@ static HAL_OUTLINE void insert_hole(void *at, uint16 size)
 }
 
 /* Removes a hole from the tree: the larger of its two children moves up, and so on downwards. */
-/* The nodes searched and the nodes moved lie on one path. */
+/* The caller's search for the hole and this loop together follow one path from the root to a leaf. */
 BOUNDS_AT("while (left != right)", loop PATH - 1, share heap_alloc_lasting PATH,
           share coalesce_free_run 2 * PATH, share heap_free PATHS);
 static HAL_OUTLINE hole *remove_hole(hole **link)

@@ -86,8 +86,8 @@ def outcome_of_flip(trials, monkeypatch, place: str, bit: int, cycle: int = 60_0
 
 
 def test_outcomes_are_classified(trials, monkeypatch):
-    """Faults in variables with known effect have the expected outcomes: a total with a copy, a mode that hangs or
-    traps, unused RAM."""
+    """Faults of known effect have the expected outcomes: in unused RAM, in `total`, of which the program keeps a copy,
+    and in `mode`, whose values can make it hang or trap."""
     one = partial(outcome_of_flip, trials, monkeypatch)
     assert (one("unused", 0).outcome, one("unused", 0).latent) == ("masked", True)
     assert one("total", 1).outcome == "detected"

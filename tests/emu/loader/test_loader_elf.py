@@ -83,9 +83,9 @@ def test_an_address_is_named_by_function_or_global_label_never_by_compiler_label
 
 def test_a_data_address_is_named_only_inside_the_variable():
     symbols = parsed(xc16_like()).symbols
-    symbol, distance = symbols.data(0x804)
+    symbol, distance = symbols.variable_at(0x804)
     assert (symbol.name, distance) == ("_buffer", 2)
-    assert symbols.data(0x806) is None
+    assert symbols.variable_at(0x806) is None
 
 
 def test_an_unusual_processor_id_is_a_warning():

@@ -59,8 +59,8 @@ static void namesakes(int wanted, int other)
     }
 }
 
-/* A robot that requests a row for ever, some or all of its parts, gets few of them. Requests of other robots and due
- * messages are still served. */
+/* A robot that never stops requesting rows (one row, or all in turn) gets only few parts. Requests of other robots and
+ * due messages are still served. */
 static void nagged(bool for_all_rows)
 {
     int n = PROGRAMS - 1, rows = programs[n].facts.rows, last = rows - 1, requests = 0;

@@ -82,7 +82,7 @@ def attempt(data: bytes) -> str:
     for address, word in image.words():
         assert address % 2 == 0
         assert 0 <= word <= 0xFFFFFF
-    image.symbols.data(0x802)
+    image.symbols.variable_at(0x802)
     memory = describe(image)["memory"]
     assert sum(len(item.words) for item in items(image, 0, 1 << 24)) == memory["flash_words"]
     assert sum(piece.rom for piece in pieces(image)) == (memory["flash_bytes"] if image.kind == "elf" else 0)

@@ -32,7 +32,7 @@ def test_the_page_has_forty_mistakes() -> None:
 def test_a_mistake_has_the_message_of_the_page(
     source: str, message: str, options: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The program's messages contain the stated text; errors refuse it, warnings do not."""
+    """The compiler prints the stated message for each mistake. An error ends the build, a warning does not."""
     monkeypatch.chdir(tmp_path)
     Path("main.c").write_text(source)
     built = build([Path("main.c")], Path("x.elf"), "-Wall", *options)
