@@ -85,6 +85,8 @@ class ControlledRobot:
         self._cuts: list[int] = []
         self._final_stop: Stop | None = None
         """Stop after which the robot does not run again, for example a fault."""
+        self._held_stop: Stop | None = None
+        """Stop of a Kilobot at the end of a quantum. The debugger gets it after the world's inputs of this cycle."""
 
     # Called in the debugger's greenlet
 
@@ -146,6 +148,8 @@ class ControlledRobot:
 
         Raises ReplayRequired if the debugger goes back to an earlier cycle."""
         self._is_over = True
+        if isinstance(self._controller, KilobotController) and self._final_stop is None:
+            self._member.machine.apply_due()
         if self._history is not None:
             self._history.resume()
         if self._debugger and not self._debugger.dead:
@@ -203,12 +207,13 @@ class ControlledRobot:
     def run_crowd(self, end: int) -> None:
         """As `CrowdControl.run_crowd`, in steps that the debugger chooses."""
         assert isinstance(self._controller, KilobotController)
-        member, crowd, stop = self._member, self._controller.crowd, None
-        member.end, member.is_at_end = end, False
-        if self._trial is None:
+        member, crowd = self._member, self._controller.crowd
+        member.end = end
+        if self._final_stop is None:
             member.run_until(self.machine.cycle)
-            if member.is_at_end:  # the robot is not switched on yet
+            if member.is_at_end:  # the robot is not switched on yet, or its last instruction has passed `end`
                 return
+        stop, self._held_stop = self._held_stop, None
         self._trial = self._debugger.parent = getcurrent()
         if self._history is not None:
             self._history.resume()
@@ -224,6 +229,7 @@ class ControlledRobot:
                 member.release()
                 break
             stop = act(NO_LIMIT)
+        self._held_stop = stop
         if not member.is_at_end:
             crowd.run_until(end)
         if self._history is not None:

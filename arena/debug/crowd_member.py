@@ -58,10 +58,16 @@ class CrowdMember:
         self._crowd.swarm.observe(self._index, None)
 
     def run_until(self, cycle: int) -> None:
-        """As `Surroundings.run_until`."""
+        """As `Surroundings.run_until`. In the present, the robot does not run past the tick `end`."""
         if self.is_past:
             self._replay(cycle)
-            return
+        else:
+            self._run_crowd(cycle)
+        if self.is_past or not self.is_at_end:  # at the end, the world may give inputs before the events of this cycle
+            self.machine.apply_due()
+
+    def _run_crowd(self, cycle: int) -> None:
+        """Run the crowd until the robot reaches a cycle, its next stop, or the tick `end`."""
         seen, crowd = self._observation, self._crowd
         seen.last = cycle
         first = len(self.machine.changes)
@@ -79,7 +85,7 @@ class CrowdMember:
                 if seen.reason != STOP_INPUTS:
                     break
                 seen.reason = STOP_NONE
-            self.is_at_end = seen.reason == STOP_NONE
+            self.is_at_end = crowd.swarm.has_reached(self._index, self.end)
         finally:
             seen.last = NEVER
             self._changes = self.machine.changes[first:]

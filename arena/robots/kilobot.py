@@ -297,7 +297,7 @@ class KilobotController:
 
     def state(self) -> bytes:
         """As `Controller.state`."""
-        return self.machine.snapshot()
+        return self.machine.comparable_state()
 
     def place(self) -> str:
         """As `Controller.place`: function and line, and cycle."""

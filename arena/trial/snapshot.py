@@ -34,4 +34,5 @@ def state_view(world: World, controllers: Sequence[Controller], robot: int) -> l
         mine = " (this one)" if number == robot else ""
         rows.append((f"robot {number}", f"x {x:.2f}, y {y:.2f}, heading {heading:.3f}; {controller.place()}{mine}"))
     rows += [(f"object {number}", f"x {x:.2f}, y {y:.2f}") for number, (x, y) in enumerate(poses.objects)]
-    return [*rows, ("state", state_digest(world, controllers))]
+    own = hashlib.sha256(controllers[robot].state()).hexdigest()
+    return [*rows, (f"state of robot {robot}", own), ("state", state_digest(world, controllers))]

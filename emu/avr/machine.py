@@ -16,7 +16,16 @@ from itertools import pairwise
 from typing import Final
 
 from emu.avr.core.addresses import ADDRESSES
-from emu.avr.core.state import EEPROM_BYTES, FLASH_BYTES, LOG_ROOM, PROGRAM_ENTRIES, Avr, Decoded
+from emu.avr.core.state import (
+    BOOKKEEPING,
+    EEPROM_BYTES,
+    FLASH_BYTES,
+    INPUT_ROOM,
+    LOG_ROOM,
+    PROGRAM_ENTRIES,
+    Avr,
+    Decoded,
+)
 from emu.avr.image import AvrImage
 from emu.avr.native import native
 from emu.image.symbols import STOP_FUNCTION
@@ -253,9 +262,26 @@ class Atmega328p:
         """Let the UART receive a byte whose frame ends at a cycle."""
         self.give_input(cycle, INPUT_UART, octet)
 
+    def apply_due(self) -> None:
+        """Apply the events of devices that are due, which the next run would do first."""
+        self._native["avr_apply_due"](self._address)
+
     def snapshot(self) -> bytes:
         """Return the whole state."""
         return bytes(self.state)
+
+    def comparable_state(self) -> bytes:
+        """Return the whole state without the interpreter's bookkeeping: equal for machines that behave equally."""
+        state = Avr.from_buffer_copy(self.state)
+        for name in BOOKKEEPING:
+            field = getattr(Avr, name)
+            ctypes.memset(ctypes.addressof(state) + field.offset, 0, field.size)
+        waiting = [(one + state.input_first) % INPUT_ROOM for one in range(state.input_count)]
+        for name in ("input_cycle", "input_kind", "input_value"):
+            ring = getattr(state, name)
+            ring[:] = [ring[one] for one in waiting] + [0] * (INPUT_ROOM - len(waiting))
+        state.input_first = 0
+        return bytes(state)
 
     def restore(self, snapshot: bytes) -> None:
         """Return to the state of a snapshot of this machine. Raises ValueError for other bytes."""

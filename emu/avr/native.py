@@ -44,5 +44,6 @@ def native() -> dict[str, Callable[..., Any]]:
         "avr_run_observed": (INT, (ADDRESS, ADDRESS, INT, ADDRESS)),
         "avr_input_observed": (INT, (ADDRESS, INT, INT, INT, ADDRESS)),
         "avr_decode": (None, (ADDRESS, ADDRESS, INT, INT)),
-        "avr_power_on": (None, (ADDRESS,)), "avr_input": (INT, (ADDRESS, INT, INT, INT)),
+        "avr_power_on": (None, (ADDRESS,)), "avr_apply_due": (None, (ADDRESS,)),
+        "avr_input": (INT, (ADDRESS, INT, INT, INT)),
     })  # fmt: skip

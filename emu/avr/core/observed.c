@@ -37,10 +37,16 @@ i64 avr_input_observed(struct avr *m, u64 at, i64 kind, i64 value, struct observ
     return avr_input(m, at, kind, value);
 }
 
+// Apply the events that are due, as a run does before the next instruction. Two stops at one cycle then show one state.
+void avr_apply_due(struct avr *m)
+{
+    apply_events(m, m->cycle);
+}
+
 // Whether an instruction executes next: the CPU is awake, and no interrupt or reset comes before.
 static int executes_next(struct avr *m)
 {
-    apply_events(m, m->cycle);
+    avr_apply_due(m);
     u32 pending = m->data[SREG_AT] & FLAG_I ? pending_vectors(m) : 0;
     return !m->asleep && !m->must_reset && !(pending && !m->shadow);
 }
@@ -50,7 +56,7 @@ i64 avr_run_observed(struct avr *m, const struct insn *code, u64 until, struct o
     i64 result = RUN_LIMIT;
     u64 last = o->last < until ? o->last : until;
     u8 before[WATCH_BYTES];
-    if (o->input_count > INPUT_LOG_ROOM / 2)
+    if (!o->reason && o->input_count > INPUT_LOG_ROOM / 2)
         o->reason = STOP_INPUTS;
     while (m->cycle < last && result == RUN_LIMIT && !o->reason) {
         if (m->pc < WORDS && o->places[m->pc] && o->passed != m->cycle && !o->steps && !m->halted && executes_next(m)) {

@@ -135,6 +135,12 @@ FIELDS: Final[tuple[tuple[str, str, int], ...]] = (
     ("flash", _U8, FLASH_BYTES),
 )
 """Fields of the record: name, type, number of elements."""
+BOOKKEEPING: Final = (
+    "until", "deadline", "skipped", "resting", "counts_until", "touched", "tracing", "round", "trace_pc", "trace_from",
+    "trace_window", "trace_end", "trace_failures", "trace_after", "trace_data", "looping", "watched", "light_changed",
+    "light_cycle", "log_count", "log_cycle", "log_register", "log_value",
+)  # fmt: skip
+"""Fields that depend on the calls in which a machine ran, and do not affect what it does."""
 
 _TYPES: Final = {_U8: ctypes.c_uint8, _U16: ctypes.c_uint16, _U32: ctypes.c_uint32, _U64: ctypes.c_uint64}
 
@@ -152,6 +158,8 @@ class Avr(ctypes.Structure):
     halted_at: int
     asleep: int
     log_count: int
+    input_first: int
+    input_count: int
     resets: int
     data_end: int
     overflow_at: int

@@ -14,7 +14,7 @@ typedef i64 (*observed_input_function)(struct avr *m, u64 at, i64 kind, i64 valu
 enum { ECHO = 9, MARGIN = 8 };
 enum { LAMP = 0xFFFFFFFF }; // sender of light from outside the swarm
 enum { INPUT_ANALOG = 2, CH_HIGH_GAIN = 0, CH_LOW_GAIN = 1, CH_AIN0 = 9 };
-enum { RUN_LIMIT, RUN_FAULT, RUN_HALT, RUN_LOG, RUN_PROGRAM, RUN_LIGHT }; // results of avr_run
+enum { RUN_LIMIT, RUN_FAULT, RUN_HALT, RUN_LOG, RUN_PROGRAM, RUN_LIGHT, RUN_BREAK }; // results of a run
 enum { LIT_UV = 1000000, DARK_UV = 0 };
 #define STOPPED (1ULL << 62) // a tick after the end of every run
 
@@ -199,13 +199,19 @@ void air_flash(struct air *a, i64 receiver, i64 at, i64 ticks, i64 high_uv, i64 
         add_edge(a, a->robots + receiver, off);
 }
 
+// Return the last tick of the robot's present cycle.
+static u64 last_tick(const struct robot *r)
+{
+    return tick_of(r, r->avr->cycle + 1) - 1;
+}
+
 // Run one robot to tick `goal`; if it sends light, only until an answer to that light can arrive. Return 0, or 1 if
 // Python must handle its state (fault, log, new program, end of an observed run).
 static int run_robot(struct air *a, i64 index, u64 goal)
 {
     struct robot *r = a->robots + index;
     while (r->reached < goal) {
-        deliver(a, r, r->reached + MARGIN);
+        deliver(a, r, (r->observation ? last_tick(r) : r->reached) + MARGIN);
         u64 piece = r->edge_count && r->edges[0].at - MARGIN < goal ? r->edges[0].at - MARGIN : goal;
         u64 cycle = cycle_at(r, piece);
         i64 result = r->observation ? a->run_observed(r->avr, r->code, cycle, r->observation)
@@ -218,8 +224,13 @@ static int run_robot(struct air *a, i64 index, u64 goal)
             r->avr->light_changed = 0;
             if (emit(a, index, at, r->avr->lit ? 1 : -1) && answered < goal)
                 goal = answered;
+        } else if (result == RUN_BREAK && last_tick(r) >= goal) {
+            // The robot stops in the next run, which knows all light that a stop at this cycle must show.
+            reached = reached > goal ? reached : goal;
         } else if (result != RUN_LIMIT && result != RUN_HALT) {
             r->reached = reached;
+            if (result == RUN_BREAK) // two stops at one cycle show the same inputs
+                deliver(a, r, last_tick(r) + MARGIN);
             return 1;
         } else if (reached < piece)
             reached = piece; // `piece` is between two cycles of this robot

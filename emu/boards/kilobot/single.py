@@ -56,7 +56,8 @@ class SingleKilobot:
                 after = send_frame(swarm, self._frame)
                 self.next_command = after if after < FIRST_COMMAND + COMMAND_TICKS else None
             if swarm.is_stopped:
-                return
+                break
+        self.machine.apply_due()
 
     def snapshot(self) -> bytes:
         """Return the whole state of robot, light and controller."""

@@ -233,6 +233,10 @@ class KilobotSwarm:
         """Return the tick of 1/8 MHz of the swarm at a cycle of a robot's own clock."""
         return self._robots[robot].on_at + cycle * self._robots[robot].period // ONE_RATE
 
+    def has_reached(self, robot: int, tick: int) -> bool:
+        """Return whether a robot has run to a tick of 1/8 MHz."""
+        return self._robots[robot].reached >= tick
+
     def pulses_sent(self, robot: int) -> int:
         """Return the light pulses that a robot has sent since power-on."""
         return self._robots[robot].pulses

@@ -126,6 +126,49 @@ def test_the_past_is_that_of_the_crowd(tmp_path: Path) -> None:
     assert is_equal == [True] * 31
 
 
+def test_a_cycle_has_one_state(tmp_path: Path) -> None:
+    """At one cycle, a robot is in the same whole state after a single step, a run, and a way back, while light comes
+    and over the ends of quanta."""
+    scene = crowd("gradient", 2, lamps=[{"x_cm": 99, "y_cm": 101, "counts": 300}])
+    scene["clock"]["quantum_ms"] = 0.5
+    plan, states, differing = plan_of(scene, 0.6), dict[int, tuple[str, bytes]](), list[tuple[str, int]]()
+
+    def state(controlled: ControlledRobot) -> tuple[str, bytes]:
+        """Return the time of the world, and the state of the robot."""
+        return controlled.describe()[0][1], controlled._member.machine.comparable_state()
+
+    def stepping(controlled: ControlledRobot) -> bool:
+        machine: Any = controlled.machine
+        history = controlled.record(machine)
+        remove = machine.hook_pc(machine.program_address("__vector_23"), lambda: True)
+        history.advance(machine.cycle + 4_000_000)
+        remove()
+        for _ in range(3000):
+            history.step(machine.cycle + 200)
+            states[machine.cycle] = state(controlled)
+        end = history.end
+        for cycle in [*random.Random(1).sample(sorted(states), 200), end]:
+            history.seek(cycle)
+            if state(controlled)[1] != states[cycle][1]:
+                differing.append(("back", cycle))
+        return True
+
+    def jumping(controlled: ControlledRobot) -> bool:
+        history = controlled.record(controlled.machine)
+        for cycle in sorted(states):
+            history.advance(cycle)
+            if (controlled.machine.cycle, state(controlled)) != (cycle, states[cycle]):
+                differing.append(("run", cycle))
+        return True
+
+    for number, debugger in enumerate((stepping, jumping)):
+        controlled = ControlledRobot(1, debugger, is_recorded=True)
+        record(plan, tmp_path / f"{number}", controlled)
+        assert controlled.finish()
+    assert len(states) > 2000
+    assert not differing
+
+
 def test_the_world_goes_back_with_a_kilobot(tmp_path: Path) -> None:
     """Breakpoint, call stack, values, `finish`, the way back, and a change that a move before its time undoes."""
     plan = plan_of(crowd("gradient", 3), 1.5)
