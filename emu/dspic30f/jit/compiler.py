@@ -33,11 +33,10 @@ from emu.host.paths import native_code
 
 @dataclass(slots=True)
 class Statistics:
-    """Object counts: requested, compiled, read from disk, loaded."""
+    """Object counts: requested, compiled, loaded."""
 
     requested: int = 0
     compiled: int = 0
-    from_disk: int = 0
     loaded: int = 0
 
 
@@ -144,7 +143,6 @@ class Compiler:
             entries, code = unpack_object(blob)
         except (struct.error, zlib.error):  # written by a process whose sources were changed while it ran
             return None
-        self.statistics.from_disk += 1
         return self.load(code, key, entries)
 
     def compile_now(self, text: str, level: int, key: str, entries: Sequence[int] = ()) -> LoadedCode:

@@ -1,4 +1,4 @@
-"""Trace blocks: the branches that stay within a block, and unchanged states and cycles."""
+"""Trace blocks: the branches and jumps that stay within a block, and unchanged states and cycles."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from emu.dspic30f.isa.codec import decode_for_execution
 from emu.dspic30f.jit.counting import CycleCounting
 from emu.dspic30f.jit.engine import JitEngine
 from emu.dspic30f.jit.translate.region import Region, discover
-from emu.dspic30f.jit.translate.trace_block import MAX_BRANCHES, MAX_SKIPPED, trace_block
+from emu.dspic30f.jit.translate.trace_block import MAX_BRANCHES, MAX_COPIED, MAX_SKIPPED, TraceItem, trace_block
 from tests.emu.jit.comparison.random_firmware import Firmware, difference, started, words_of
 
 IFS0 = DSPIC30F6014A.sfrs["IFS0"].address
@@ -30,6 +30,12 @@ def over(*skipped: list[int]) -> list[int]:
     """Return BRA NC over `skipped`."""
     words = [word for one in skipped for word in one]
     return words_of("BRA NC, Expr", n=len(words)) + words
+
+
+def jump(*unreached: list[int]) -> list[int]:
+    """Return BRA over instructions."""
+    words = [word for one in unreached for word in one]
+    return words_of("BRA Expr", n=len(words)) + words
 
 
 def past(words: list[int]) -> list[int]:
@@ -51,6 +57,13 @@ BODIES = {
     ),
     "before a pointer it has written": SHIFT + over(words_of("MOV{.W} #lit16, Wnd", k=0x902, d=4)) + LOAD,
     "before a call": SHIFT + over(XOR) + words_of("RCALL Expr", n=0x100),
+    "a jump": SHIFT + jump(XOR) + COUNT + STORE,
+    "a jump to more than is copied": jump(XOR) + COUNT * (MAX_COPIED + 3),
+    "two jumps": SHIFT + jump(XOR) + COUNT + jump(SHIFT) + STORE,
+    "a jump past a leader": jump(XOR) + COUNT + SHIFT + XOR + words_of("BRA N, Expr", n=-3),
+    "a jump to a short and a long block": jump(XOR) + COUNT + SHIFT * MAX_COPIED + words_of("BRA N, Expr", n=-9),
+    "a jump before a pointer it has written": words_of("MOV{.W} #lit16, Wnd", k=0x902, d=4) + jump(XOR) + LOAD,
+    "a jump to a call": SHIFT + jump(COUNT) + words_of("RCALL Expr", n=0x100),
 }
 
 
@@ -75,11 +88,21 @@ def region_of(body: list[int]) -> Region:
     return discover(START, lambda pc: decode_for_execution(flash.get(pc, 0), flash.get(pc + 2, 0)))
 
 
+def block(body: list[int], barriers: set[int] | None = None, last: int = -1) -> list[TraceItem]:
+    """Return the first block of the body."""
+    region = region_of(body)
+    return trace_block(region, START, region.leaders, barriers or set(), last)
+
+
 def arms(body: list[int], barriers: set[int] | None = None, last: int = -1) -> list[int]:
     """Return the number of instructions that each branch of the first block skips."""
-    region = region_of(body)
-    items = trace_block(region, START, region.leaders, barriers or set(), last)
-    return [len(item.skipped) for item in items if item.skipped]
+    return [len(item.skipped) for item in block(body, barriers, last) if item.skipped]
+
+
+def places(body: list[int], barriers: set[int] | None = None, last: int = -1) -> list[int]:
+    """Return the word offsets of the instructions of the first block, up to the end of the body."""
+    offsets = [(item.step.pc - START) // 2 for item in block(body, barriers, last)]
+    return [offset for offset in offsets if offset < len(body)]
 
 
 @pytest.mark.parametrize(("name", "lengths"), [
@@ -99,6 +122,25 @@ def test_a_block_ends_where_something_is_looked_at() -> None:
     body = BODIES["a branch round one"]
     assert arms(body) == [1]
     assert arms(body, {skipped}) == arms(body, {behind}) == arms(body, last=skipped) == []
+
+
+def test_a_block_continues_at_the_target_of_one_jump() -> None:
+    """A block continues with whole blocks of at most MAX_COPIED instructions behind its first jump.
+
+    A hook at a target or the end of a DO loop ends it."""
+    past_a_leader = BODIES["a jump past a leader"]
+    assert places(past_a_leader) == [0, 2, 3, 4, 5]
+    assert places(past_a_leader, {START + 6}) == [0, 2]
+    assert places(past_a_leader, {START + 4}) == places(past_a_leader, last=START) == [0]
+    assert places(past_a_leader, last=START + 8) == [0, 2, 3, 4]
+    assert places(BODIES["a jump to a short and a long block"]) == [0, 2]
+    assert places(BODIES["a jump to more than is copied"]) == [0]
+    assert places(BODIES["two jumps"]) == [0, 1, 3, 4]
+
+
+def test_a_loop_is_not_unrolled() -> None:
+    """A jump back into its own block ends the block."""
+    assert places(COUNT + words_of("BRA Expr", n=-2)) == [0, 1]
 
 
 @pytest.mark.slow

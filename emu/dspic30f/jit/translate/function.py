@@ -75,6 +75,8 @@ class Translator(FunctionFrame):
         """Addresses at which a block must begin, because a deadline, polling loop or hook is checked there."""
         self._skipped: tuple[Step, ...] = ()
         """Instructions of the current block that the branch being translated skips."""
+        self._jumps = False
+        """Whether the block continues at the target of the jump being translated."""
 
     def text(self) -> str:
         """Return the LLVM IR of the region as a module."""
@@ -184,7 +186,7 @@ class Translator(FunctionFrame):
             e.line(f"store i1 true, ptr %passed.{start:x}")
         written: Number = v.get("stall")
         for item in items:
-            self._skipped = item.skipped
+            self._skipped, self._jumps = item.skipped, item.jumps
             try:
                 ended, written = self._instruction(item.step, written)
             except NeedsInterpreter:
@@ -277,6 +279,9 @@ class Translator(FunctionFrame):
         if self._skipped:
             assert isinstance(flow, (Branch, Skip))
             return False, self._convert_branch(step, flow, cycles, mask)
+        if self._jumps:
+            self.advance(step.pc, cycles, mask)
+            return False, mask
         self._flow(step, flow, cycles, mask)
         return True, mask
 
@@ -390,7 +395,7 @@ class Translator(FunctionFrame):
         e.end(f"br label %{join}")
         e.start(through)
         v.new_block()
-        self._skipped = ()
+        self._skipped, self._jumps = (), False
         written: Number = mask
         try:
             for one in skipped:
