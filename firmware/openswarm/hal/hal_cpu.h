@@ -68,7 +68,7 @@ typedef sys_pcb *(*hal_pick)(void); /* kernel stack, slice level; returns the th
     __extension__({                                                                           \
         hal_lock_state hal_lock_ = hal_lock_devices();                                        \
         __typeof__(place) hal_value_ = (place);                                               \
-        hal_unlock(hal_lock_);                                                                \
+        (hal_unlock)(hal_lock_); /* not a test's macro of that name */                        \
         hal_value_;                                                                           \
     })
 #define HAL_STORE(place, value)                                                               \
@@ -76,7 +76,7 @@ typedef sys_pcb *(*hal_pick)(void); /* kernel stack, slice level; returns the th
         __typeof__(place) hal_value_ = (value); /* not under the lock: hal_in_isr() */       \
         hal_lock_state hal_lock_ = hal_lock_devices();                                        \
         (place) = hal_value_;                                                                 \
-        hal_unlock(hal_lock_);                                                                \
+        (hal_unlock)(hal_lock_); /* not a test's macro of that name */                        \
     } while (0)
 #endif
 

@@ -184,17 +184,27 @@ def test_programs_agree_in_qemu(target: str, tmp_path: Path) -> None:
     image = make(target, "model", tmp_path, f"DEFINES={DEFINES_IN_QEMU}", apps=TARGET_APPS)
     in_qemu(target, image).close()  # skips if QEMU is missing
     machine = CpuInQemu(BOARDS[target], image)
+    check_on(machine, Program.parse(WITHDRAWN_REQUEST))
     check_all(partial(check_on, machine), [*random_programs(base_seed() + 1, 15), *at_known_boundaries()])
     assert machine.compared > 20
 
 
 @pytest.mark.slow
 def test_programs_agree_on_the_kilobot(tmp_path: Path) -> None:
-    """At least 200 programs agree with the model on the Kilobot's ATmega328P, whose RAM few programs fit."""
+    """At least 200 programs agree with the model on the Kilobot's ATmega328P, also with an interrupt within a call.
+
+    Few programs fit its RAM.
+    """
     image = make("kilobot", "model", tmp_path, f"DEFINES={DEFINES_OF_KILOBOT}", apps=TARGET_APPS)
     kilobot(image).close()  # skips if simavr is missing
     machine = KilobotCpu(image)
-    check_on(machine, Program.parse(SPEEDS_OUT_OF_RANGE))
+    for text in (SPEEDS_OUT_OF_RANGE, WITHDRAWN_REQUEST):
+        check_on(machine, Program.parse(text))
+    assert machine.compared == 2
+    check_on(machine, Program.parse(FRAGMENTED_HEAP))
+    assert machine.compared == 2
+    assert machine.lost > 0
+    check_all(partial(check_on, machine), at_known_boundaries())
     seed = base_seed()
     while machine.compared < 200:
         check_all(partial(check_on, machine), random_programs(seed, 20))
@@ -205,6 +215,16 @@ def test_programs_agree_on_the_kilobot(tmp_path: Path) -> None:
 SPEEDS_OUT_OF_RANGE = """main 0: START_KERNEL(0, 0, 0); SUBSCRIBE(5, 4, 1); SEND(5, 6, 1); YIELD(0, 0, 0)
 handler 1: MOTOR_SPEEDS(0, 0, 0)"""
 """The error of the motors' handler is that of all handlers, where a store under a lock looks like an interrupt."""
+WITHDRAWN_REQUEST = """main 0: REGISTER(0, 0, 0); SUBSCRIBE(0, 4, 0); SET_SCHEDULER(1, 0, 0); START_KERNEL(0, 0, 0); \
+START_SECTION(0, 0, 0); SEND_INT(0, 0, 0); SET_SCHEDULER(0, 0, 0); END_SECTION(0, 0, 0); SLEEP(1, 0, 0)"""
+"""Round robin withdraws the switch that the message requested: the end of the section delivers no message."""
+
+
+FRAGMENTED_HEAP = """main 0: START_WITH(0, 2, 0); START_KERNEL(0, 0, 0); SUBSCRIBE(5, 1, 3)
+thread 2: SUBSCRIBE(3, 1, 18)
+handler 2: KILL(0, 0, 0); TICK(0, 0, 0); SEND_INT(5, 0, 0)
+handler 3: TICK(0, 0, 0); READ(0, 0, 0)"""
+"""A message of the clock is lost on the Kilobot alone, which sets no error (Sys_Get_LastError)."""
 
 
 def test_the_readme_states_every_planted_fault() -> None:

@@ -33,6 +33,8 @@ VECTORS = {"machine_clock_due": 12, "machine_slice_due": 14, "machine_device_due
 """By function at which the test sets a flag of the ATmega328P: the number of its vector."""
 FIRST_ARGUMENT = 24
 """Data address of R24, whose pair with R25 has the first argument of a function."""
+EVENTS_LOST = 4
+"""Offset of events_lost in sys_statistics, which has only 16-bit members."""
 HEAP, HEAP_IN_QEMU, HEAP_OF_KILOBOT = 3500, 24_000, 480
 """Heap bytes above which a program is not compared, because the model has no fragmentation."""
 OF_A_PORT = (Code.UNUSED_STACK, Code.UNUSED_KERNEL_STACK)
@@ -48,6 +50,8 @@ class Comparison:
     """Heap bytes in use when a program starts."""
     compared = 0
     """Programs that fitted into the heap."""
+    lost = 0
+    """Messages that the last program lost for lack of memory. Those of the kernel, as the clock's, set no error."""
 
     def run(self, program: Program, most: int) -> list[Record]:
         """Run a program and return at most its first `most` records."""
@@ -60,14 +64,14 @@ class Comparison:
         if executor.k.peak > self.heap:
             return None
         seen = self.run(program, LIMITS["MOST_RECORDS"] if executor.later_used else len(alone))
-        wanted = alone
-        for _, records in executions(program, self.sizes, self.base, seen):
-            wanted = without_final_state(records)
+        wanted, lost = alone, executor.k.events_lost
+        for execution, records in executions(program, self.sizes, self.base, seen):
+            wanted, lost = without_final_state(records), execution.k.events_lost
             if comparable(seen) == comparable(wanted):
                 self.compared += 1
                 return None
-        if is_out_of_memory(seen, wanted):  # a fragmented heap, which the model does not know
-            return None
+        if is_out_of_memory(seen, wanted) or self.lost > lost:
+            return None  # a fragmented heap, which the model does not know
         return Difference(0, comparable(seen), comparable(wanted))
 
 
@@ -107,6 +111,7 @@ class Robot(Comparison):
             stop = machine.run(cycles=20_000)
             if stop.reason != "limit" or machine.cycle > start + PATIENCE:
                 break
+        self.lost = machine.peek(machine.address_of("os_statistics") + EVENTS_LOST)
         return self.records[:most]
 
 
@@ -135,6 +140,7 @@ class CpuInQemu(Comparison):
                 machine.run_to("machine_done", "hal_stop")
             except Stopped as stopped:
                 raise AssertionError(f"{program}\n{stopped}") from None
+            self.lost = peek(machine, "os_statistics", EVENTS_LOST)
             at, count = machine.symbols["records"], peek(machine, "recorded")
             return list(RECORD.iter_unpack(machine.peek_bytes(at, count * RECORD.size)))
 
@@ -142,8 +148,8 @@ class CpuInQemu(Comparison):
 class KilobotCpu(Comparison):
     """The Kilobot's CPU in simavr, which starts once per program. Raises NotInstalled.
 
-    Not compared are programs with an interrupt within a call; those with cleanups, whose script runs on the stack of
-    another script; and those that its 2 kB of RAM cannot hold.
+    Not compared are programs with cleanups, whose script runs on the stack of another script, and those that its 2 kB
+    of RAM cannot hold.
     """
 
     heap = HEAP_OF_KILOBOT
@@ -166,7 +172,7 @@ class KilobotCpu(Comparison):
     def difference(self, program: Program) -> Difference | None:
         alone = Executor(program, self.sizes).run(self.base)
         codes = {Code(operation[0]) for script in program.scripts for operation in script.operations}
-        if codes & {Code.LATER, Code.PUSH} or max(record[4] for record in alone) >= MOST_PIDS:
+        if Code.PUSH in codes or max(record[4] for record in alone) >= MOST_PIDS:
             return None
         if len(program.encoded()) > PROGRAM_BYTES:
             return None
@@ -196,6 +202,7 @@ class KilobotCpu(Comparison):
                     machine.interrupt(due[place])
                 else:
                     idles += 1
+            self.lost = peek(machine, "os_statistics", EVENTS_LOST)
         return records
 
 

@@ -206,15 +206,50 @@ def test_who_cannot_hear_each_other_collide(image: Path, swarm: Open) -> None:
 
 
 def test_who_hear_each_other_take_turns(image: Path, swarm: Open) -> None:
-    """Robots that receive each other take turns: of 80 frames at most one pair begins at the same time and is lost."""
+    """Robots that receive each other take turns, and each frame arrives at both others unless two begin at once.
+
+    Two that begin within 4 us of each other take the other's first pulse for a reflection (ECHO), and lose both frames.
+    Each begins at its next tick, of 977 us: less than 1 % of the pairs of messages are lost, 0.3 of 40 pairs, and more
+    than 3 of 40 with a probability of 0.0004.
+    """
     heap = swarm([Robot(image, 30.0 * n, number=n + 1, on_at=0.0011 * n) for n in range(3)])
     heap.run(0.2)
-    before = statistics(heap.robots[1])["damaged"]
-    talk(heap, (0, 2), 40, 0.06)
-    heap.run(0.2)
-    collisions = statistics(heap.robots[1])["damaged"] - before
-    assert collisions <= 1
-    assert peek(heap.robots[1], "messages") == 80 - 2 * collisions
+    collisions = 0
+    for n in range(40):
+        before = [peek(robot, "messages") for robot in heap.robots]
+        damaged = statistics(heap.robots[1])["damaged"]
+        talk(heap, (0, 2), 1, 0.06)
+        arrived = [peek(robot, "messages") - earlier for robot, earlier in zip(heap.robots, before, strict=True)]
+        if arrived == [0, 0, 0]:
+            assert statistics(heap.robots[1])["damaged"] > damaged
+            collisions += 1
+        else:
+            assert arrived == [1, 2, 1], n
+    assert collisions <= 3
+
+
+def test_a_frame_arrives_soon_after_a_pulse(image: Path, swarm: Open) -> None:
+    """A frame arrives if the receiver got no other pulse in the 1.1 ms before it, whatever the phase of its ticks."""
+    before, leading_byte, ahead_us = 0.2, 0.0004, 20
+
+    def with_message() -> tuple[Any, Kilobot]:
+        both = swarm(pair(image))
+        both.run(before)
+        say(both.robots[0], MESSAGE, b"soon")
+        return both, both.robots[1]
+
+    both, right = with_message()
+    frame_begins(both, right)
+    begin = both.now / HZ - leading_byte
+
+    def check(silent_us: float) -> None:
+        both, right = with_message()
+        both.run(begin - (silent_us + ahead_us) * 1e-6 - before)
+        both.flash(1, ahead_us)
+        both.run(0.03)
+        assert (peek(right, "messages"), statistics(right)["false_starts"]) == (1, 1)
+
+    check_all(check, range(1100, 2000, 200))
 
 
 def test_numbers_are_drawn(image: Path, swarm: Open) -> None:

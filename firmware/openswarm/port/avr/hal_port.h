@@ -94,9 +94,14 @@ static inline __attribute__((always_inline)) void hal_slice_force(void)
     GPIOR0 |= CPU_DUE;
 }
 
+/* Either devices are locked, or hal_slice_restart() follows before the level opens: it repairs "due" if an interrupt comes
+ * between two of these instructions. */
 static inline __attribute__((always_inline)) void hal_slice_unforce(void)
 {
     GPIOR0 &= (uint8_t)~CPU_FORCED;
+    if (!(GPIOR0 & CPU_OVER)) {
+        GPIOR0 &= (uint8_t)~CPU_DUE;
+    }
 }
 
 #endif

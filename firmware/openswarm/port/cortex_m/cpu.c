@@ -16,7 +16,7 @@ typedef struct { /* registers restored by PendSV, then those restored by the har
 
 volatile uint8 cpu_slice_ms = CPU_SLICE_MS;
 volatile bool cpu_forced;
-hal_pick cpu_pick; /* called by PendSV, returns the next thread; NULL: a slice has ended */
+volatile hal_pick cpu_pick;
 
 extern uint32_t main_stack_bottom[];
 
@@ -159,6 +159,7 @@ HAL_USED void cpu_guard_hit(void)
 {
     SCB_CFSR = SCB_CFSR_MEMMANAGE;
     os_running->limit = UINT32_MAX;
+    cpu_slice_ms = 0; /* hal_slice_unforce() in an ISR before PendSV does not withdraw it */
     pend_and_open(NULL);
 }
 

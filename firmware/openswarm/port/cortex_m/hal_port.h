@@ -20,6 +20,7 @@ enum { CPU_PRIORITY_DEVICE = 0x50, CPU_PRIORITY_SLICE = 0xF0, CPU_SLICE_MS = 10,
 
 extern volatile uint8_t cpu_slice_ms; /* ms left of the slice */
 extern volatile bool cpu_forced;      /* PendSV is pending for another reason */
+extern volatile hal_pick cpu_pick;    /* called by PendSV, returns the next thread; NULL: a slice has ended */
 
 #if SYS_CHECK_LEVELS
 void cpu_check_level(void); /* stops the system if the running interrupt may not call the kernel */
@@ -101,9 +102,14 @@ static HAL_INLINE void hal_slice_force(void)
     SCB_ICSR = SCB_ICSR_PENDSVSET;
 }
 
+/* Either devices are locked, or hal_slice_restart() follows before the level opens: it repairs PendSV if an interrupt comes
+ * in between. The end of a slice and pend_and_open() pend PendSV, too. */
 static HAL_INLINE void hal_slice_unforce(void)
 {
     cpu_forced = false;
+    if (cpu_slice_ms != 0 && cpu_pick == NULL) {
+        SCB_ICSR = SCB_ICSR_PENDSVCLR;
+    }
 }
 
 #endif

@@ -76,9 +76,14 @@ static HAL_INLINE void hal_slice_force(void)
     REGISTER(CLINT_MSIP) = 1;
 }
 
+/* Either devices are locked, or hal_slice_restart() follows before the level opens: it repairs the software interrupt if
+ * another interrupt comes in between. */
 static HAL_INLINE void hal_slice_unforce(void)
 {
     cpu_forced = false;
+    if (cpu_slice_ms != 0) {
+        REGISTER(CLINT_MSIP) = 0;
+    }
 }
 
 #endif

@@ -141,6 +141,8 @@ HAL_USED void infrared_pulse_isr(void)
     if (at == seen) { /* read_byte() has processed it */
         return;
     }
+    /* Ticks alone would miss a frame: its sender, which also counts ticks, may begin less than two after the last pulse. */
+    bool was_silent = quiet >= SILENCE || (uint16)(at - seen) > TICK;
     seen = at;
     if (state == LEADING) {
         collided |= (uint16)(at - lit_at) > ECHO;
@@ -148,9 +150,8 @@ HAL_USED void infrared_pulse_isr(void)
         quiet = 0;
         take_byte(read_byte(at));
     } else if (state == LISTEN) {
-        bool was_silent = quiet >= SILENCE; /* otherwise this pulse is inside a frame */
         quiet = 0;
-        if (was_silent) {
+        if (was_silent) { /* otherwise this pulse is inside a frame */
             begin_frame(read_byte(at));
         }
     }
