@@ -12,8 +12,6 @@ from typing import Any, Final
 from emu.commands.baseline_options import BaselineCommand, add_baseline_arguments, conditions_of
 from emu.commands.board_options import add_board_options, board_of, set_up
 from emu.commands.disasm import code_address
-from emu.debug.dwarf.units import debug_of
-from emu.debug.inlining import missing_function
 from emu.host.command import CommandError, Parser, seconds
 from emu.host.exit_status import FAULT
 from emu.image.loader import load_image
@@ -77,7 +75,7 @@ def _application(image: Image, options: argparse.Namespace) -> int:
 
     if image.kind != "elf":
         raise CommandError(f"{image.path}: a HEX file has no debug information; give the ELF file")
-    functions = [(name, _function(image, name)) for name in options.function]
+    functions = [(name, code_address(image, name)) for name in options.function]
     intervals = [_interval(image, text) for text in options.interval]
     command = BaselineCommand("cycles", options, conditions_of(options, parser()))
     machine = Machine(image.chip, engine="plain", board=board_of(options))
@@ -103,14 +101,6 @@ def _application(image: Image, options: argparse.Namespace) -> int:
         print(f"emu cycles: {fault.report()}", file=sys.stderr)
         return FAULT
     return status
-
-
-def _function(image: Image, name: str) -> int:
-    if image.symbols.find(name) is None:
-        reason = missing_function(debug_of(image), name)
-        if reason:
-            raise CommandError(f"--function {name}: {reason}")
-    return code_address(image, name)
 
 
 def _interval(image: Image, text: str) -> tuple[str, int, int]:

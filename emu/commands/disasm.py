@@ -9,6 +9,8 @@ from collections.abc import Iterator
 
 from emu.commands.image_option import add_chip_option, image_of
 from emu.debug.disassembly import Item
+from emu.debug.dwarf.units import debug_of
+from emu.debug.inlining import missing_function
 from emu.dspic30f.state.state import PC_MASK
 from emu.host.command import CommandError, Parser
 from emu.host.exit_status import DONE
@@ -71,7 +73,8 @@ def code_address(image: Image, text: str) -> int:
     try:
         address = int(text, 0)
     except ValueError:
-        raise CommandError(f"{image.path} has no symbol {text!r}, and it is not an address") from None
+        reason = missing_function(debug_of(image), text) or "not in the program, and not an address"
+        raise CommandError(f"{image.path}: {text!r}: {reason}") from None
     if address & 1 or not 0 <= address <= PC_MASK:
         raise CommandError(f"{text} is not a program address; expected an even number, 0 to {PC_MASK:#x}")
     return address

@@ -9,6 +9,7 @@ from emu.dap.breakpoints import Breakpoint, hit_condition_error
 from emu.dap.state_requests import StateRequests
 from emu.dap.variables import Row
 from emu.debug.expressions.expression import evaluate
+from emu.debug.inlining import inlined_entries
 from emu.debug.inspector import Value
 
 ACCESSES: Final = ("read", "write", "readWrite")
@@ -55,13 +56,17 @@ class BreakpointRequests(StateRequests):
     def _do_setFunctionBreakpoints(self, arguments: Row) -> Row:
         made = []
         for one in arguments["breakpoints"]:
-            try:
-                start = self._debuggee.machine.program_address(one["name"])
-                addresses: tuple[int, ...] = (self._debuggee.inspector.prologue_end(start),)
-            except KeyError:
-                addresses = ()
+            addresses = self._function_entries(one["name"])
             made.append(self._breakpoint(one, "function", addresses, problem=f"there is no function {one['name']}"))
         return self._set("function", made)
+
+    def _function_entries(self, name: str) -> tuple[int, ...]:
+        """Return the end of a function's prologue, or the first address of each copy if it was inlined everywhere."""
+        inspector = self._debuggee.inspector
+        try:
+            return (inspector.prologue_end(self._debuggee.machine.program_address(name)),)
+        except KeyError:
+            return inlined_entries(inspector.debug, name)
 
     def _do_setInstructionBreakpoints(self, arguments: Row) -> Row:
         made = []

@@ -25,6 +25,11 @@ def inlined_into(debug: DebugInfo, name: str) -> list[str]:
     return list(dict.fromkeys(one.name for one in debug.functions if any(copy.name == name for copy in _copies(one))))
 
 
+def inlined_entries(debug: DebugInfo, name: str) -> tuple[int, ...]:
+    """Return the first program address of each copy of a function that was inlined, ascending."""
+    return tuple(sorted(copy.ranges[0][0] for one in debug.functions for copy in _copies(one) if copy.name == name))
+
+
 def _copies(scope: Scope) -> Iterator[Scope]:
     """Yield all inlined scopes inside a scope."""
     for inner in scope.inner:

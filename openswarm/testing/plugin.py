@@ -112,6 +112,17 @@ def robot(request: pytest.FixtureRequest, firmware: Path) -> Robot:
     return made
 
 
+def _cut_traceback(info: pytest.ExceptionInfo[BaseException]) -> None:
+    """End the traceback of a failed test at the last line outside this package: a user cannot mend the lines inside."""
+    import emu
+
+    packages = [Path(emu.__file__).parent, Path(__file__).parents[1]]
+    entries = list(info.traceback)
+    while len(entries) > 1 and any(Path(entries[-1].path).is_relative_to(one) for one in packages):
+        entries.pop()
+    info.traceback = type(info.traceback)(entries)
+
+
 def failure_of(call: pytest.CallInfo[None]) -> str:
     """Return what failed in a test: `assert 0 == 3 (test_robot.py:12)`, or the exception."""
     info = call.excinfo
@@ -133,8 +144,10 @@ def pytest_runtest_makereport(
     item: pytest.Item, call: pytest.CallInfo[None]
 ) -> Generator[None, pytest.TestReport, pytest.TestReport]:
     """Add properties for the JUnit report, and write the artefacts of a failed test."""
-    report = yield
     robots = item.stash.get(ROBOTS, [])
+    if robots and call.excinfo is not None and not item.config.getoption("fulltrace"):
+        _cut_traceback(call.excinfo)
+    report = yield
     if report.when != "call" or not robots:
         return report
     for number, one in enumerate(robots):

@@ -95,6 +95,8 @@ def test_a_failure_says_where_and_leaves_a_waveform(tests, how):
     assert re.search(r"address error trap: writing 2 bytes at 0x3001.*\(store\+0x\w+, .*main\.c:3\)", said)
     assert "did not send b'ready' within 50 ms; it sent '\\r\\n'" in said
     assert "the test failed; at" in said
+    assert "wait.py:" not in said  # a traceback ends at the line of the test
+    assert re.search(r"within 50 ms; it sent.*\n  at test_it\.py:\d+\n", said)
     folder = tests / "robot-artefacts" / "test_it.py_test_it_survives_an_answer"
     assert f"waveform: {folder / 'waves.vcd'}" in said
     assert "last branches" in (folder / "report.txt").read_text()
@@ -180,7 +182,7 @@ def test_the_action_s_steps_as_they_are_from_the_wheel(wheel, baselines, tmp_pat
 def test_the_report_of_a_call_has_the_cycles_of_each_robot(when: str, noted: bool) -> None:
     """The hook adds the cycles of each robot to the properties of its test once, after the call."""
     item = SimpleNamespace(stash={ROBOTS: [SimpleNamespace(cycle=5), SimpleNamespace(cycle=7)]}, user_properties=[])
-    hook = pytest_runtest_makereport(item, None)
+    hook = pytest_runtest_makereport(item, SimpleNamespace(excinfo=None))
     next(hook)
     with pytest.raises(StopIteration):
         hook.send(SimpleNamespace(when=when, failed=False))

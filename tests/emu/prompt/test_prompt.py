@@ -89,6 +89,25 @@ def test_a_breakpoint_at_a_function_is_after_the_prologue(play: type) -> None:
     assert re.search(r"\na = 2\nb = 0\nsum = -?\d+\n$", out)
 
 
+def test_a_function_that_was_inlined_everywhere_stops_at_each_copy(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A breakpoint at it has one address for each copy; `emu run --break` says where it was inlined."""
+    source, image = tmp_path / "inlined.c", str(tmp_path / "inlined.elf")
+    source.write_text(
+        "volatile int total;\nstatic inline __attribute__((always_inline)) void add(int n)\n{\n    total += n;\n}\n"
+        "int main(void)\n{\n    add(3);\n    total = 9;\n    add(4);\n    return 0;\n}\n"
+    )
+    assert driver.main(["-g", "-Os", str(source), "-o", image]) == 0
+    script = io.StringIO("break add\nrun\nprint total\nbt\ncontinue\nprint total\nreverse-continue\nprint total\n")
+    assert Prompt("emu debug", lambda client: Server(client, lambda _launch: emu.load(image))).serve({}, script) == 0
+    said = capsys.readouterr().out
+    assert re.findall(r"(?m)^total = (\d)$", said) == ["0", "9", "0"]
+    assert "* #0 add at inlined.c:4\n  #1 main at inlined.c:8\n" in said
+    assert main(["run", image, "--break", "add"]) == 2
+    assert capsys.readouterr().err.count("'add': inlined into main; add __attribute__((noinline))") == 1
+
+
 def test_a_script_ends_with_the_first_command_that_fails(play: type) -> None:
     played = play("break main", "run", "print nonsense", "print total")
     assert played.status == 2
