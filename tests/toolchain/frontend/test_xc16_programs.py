@@ -9,11 +9,8 @@ import pytest
 
 import emu
 from emu.chips import NAMES as CHIPS
-from emu.chips import chip_named
-from emu.image.loader import load_image
 from tests.toolchain.c_programs import run
 from toolchain.driver import driver
-from toolchain.frontend import config_pragma
 
 LEVELS = ("-O0", "-O1", "-O2", "-Os")
 
@@ -103,86 +100,6 @@ def test_a_header_that_is_nowhere_stays_an_error(tmp_path: Path, capfd: pytest.C
     (tmp_path / "main.c").write_text('#include "nowhere.h"\n')
     assert driver.main(["-c", str(tmp_path / "main.c"), "-o", str(tmp_path / "main.o")]) == 1
     assert "main.c:1:10: fatal error: 'nowhere.h' file not found" in capfd.readouterr().err
-
-
-def test_configuration_pragmas_make_configuration_words(tmp_path: Path) -> None:
-    """Configuration pragmas of MPLAB X's code generator create configuration words (dspic30f6014a.md §2)."""
-    source = """
-    #pragma config FOSFPR = XT_PLL8, FCKSMEN = CSW_FSCM_OFF
-    #pragma config FWPSB = WDTB_16
-    #pragma config FWPSA = WDTA_64
-    #pragma config WDT = WDT_OFF
-    #pragma config FPWRT = PWRT_16, BODENV = BORV27, BOREN = PBOR_OFF, MCLRE = MCLR_EN
-    #pragma config GWRP = GWRP_OFF, GCP = CODE_PROT_ON
-    #pragma config ICS = 1
-    int main(void) { return 0; }
-    """
-    (tmp_path / "main.c").write_text(source)
-    assert driver.main([str(tmp_path / "main.c"), "-o", str(tmp_path / "main.elf")]) == 0
-    image = load_image(tmp_path / "main.elf")
-    set_ = {word.name: image.word(word.address) for word in image.chip.config.values()}
-    words = {name: value & 0xFFFF for name, value in set_.items() if value is not None}
-    assert words == {"FOSC": 0xFFE6, "FWDT": 0x7FEF, "FBORPOR": 0xFF6E, "FGS": 0xFFFD, "FICD": 0xFFFD}
-
-
-def test_protection_of_segments_by_pragmas_and_macros(tmp_path: Path) -> None:
-    """Pragmas and macros accept every setting of MPLAB X for this device with its value names (DS70138, section 20)."""
-    (tmp_path / "main.c").write_text("""
-    #pragma config BODENV = NONE
-    #pragma config BWRP = WR_PROTECT_BOOT_OFF, BSS = NO_BOOT_CODE, EBS = SMALL_BOOT_EEPROM, RBS = MED_BOOT_RAM
-    #pragma config SWRP = WR_PROT_SEC_OFF, SSS = NO_SEC_CODE, ESS = NO_SEC_EEPROM, RSS = NO_SEC_RAM
-    #pragma config GWRP = GWRP_OFF, GCP = GSS_OFF
-    #pragma config ICS = ICS_PGD2
-    int main(void) { return 0; }
-    """)
-    (tmp_path / "macros.c").write_text("""
-    #include <p30F6014A.h>
-    _FBORPOR(PBOR_OFF); _FBS(WR_PROTECT_BOOT_ON & STRD_MEDIUM_BOOT_CODE & NO_BOOT_EEPROM & LARGE_BOOT_RAM);
-    _FSS(WR_PROT_SEC_ON & HIGH_LARGE_SEC_CODE & MED_SEC_EEPROM & SMALL_SEC_RAM); _FGS(GSS_HIGH); _FICD(PGD3);
-    enum { NONE } left_to_the_program;
-    int main(void) { return 0; }
-    """)
-    wanted = {
-        "main": {"FBORPOR": 0xFFFF, "FBS": 0xDEFF, "FSS": 0xFFFF, "FGS": 0xFFFF, "FICD": 0xFFFD},
-        "macros": {"FBORPOR": 0xFF7F, "FBS": 0xCFFA, "FSS": 0xEDF0, "FGS": 0xFFFB, "FICD": 0xFFFC},
-    }
-    for name, words in wanted.items():
-        assert driver.main([str(tmp_path / f"{name}.c"), "-o", str(tmp_path / f"{name}.elf")]) == 0
-        image = load_image(tmp_path / f"{name}.elf")
-        found = {word.name: image.word(word.address) for word in image.chip.config.values()}
-        assert {key: value & 0xFFFF for key, value in found.items() if value is not None} == words
-
-
-def test_a_wrong_configuration_pragma_names_its_line(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    wrong = "int a;\n#pragma config FPR = XT_PL8\n\n#pragma config FOO = 1\n"
-    (tmp_path / "main.c").write_text(wrong + "int main(void) { return 0; }\n")
-    assert driver.main([str(tmp_path / "main.c"), "-o", str(tmp_path / "main.elf")]) == 2
-    said = capfd.readouterr().err
-    assert "main.c:2: error: #pragma config: 'XT_PL8' is not a value of FPR (did you mean XT_PLL8" in said
-    assert "main.c:4: error: #pragma config: no setting 'FOO' on this device" in said
-    assert not (tmp_path / "main.elf").exists()
-
-
-def test_a_setting_made_twice_is_refused_unless_it_is_the_same(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    """Two different values of one setting are an error, because the result would depend on their order; equal ones
-    are not."""
-    main = tmp_path / "main.c"
-    twice = "#pragma config WDT = WDT_OFF\n#pragma config WDT = {}, GWRP = GWRP_OFF\nint main(void) {{ return 0; }}\n"
-    main.write_text(twice.format("WDT_ON"))
-    said = refusal(capsys, main)
-    assert "main.c:2: error: #pragma config WDT = WDT_ON, but WDT = WDT_OFF at" in said
-    assert "main.c:1" in said
-    main.write_text(twice.format("WDT_OFF"))
-    assert driver.main([str(main), "-o", str(tmp_path / "main.elf")]) == 0
-
-
-def test_every_value_macro_of_the_header_changes_one_word() -> None:
-    """Each value macro of the header changes one setting of one word: only bits of that setting are 0 in it."""
-    masks = [mask for _, mask in config_pragma.settings(chip_named()).values()]
-    for name, value in config_pragma.values().items():
-        assert any((value | mask) & 0xFFFF == 0xFFFF for mask in [*masks, 0xC71F, 0x803F]), name
 
 
 def test_the_command_lines_of_mplab_x(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -300,50 +217,6 @@ def test_calendar_time_agrees_with_the_host(tmp_path: Path) -> None:
     assert status_of(tmp_path, source, "-Os") == 7
 
 
-SCANF = """
-#include <stdio.h>
-int main(void)
-{
-    int a = 0, b = 0; long l; long long w; char s[20], t[20], c[4] = {0}; float f; double d; unsigned char h;
-    unsigned x; int n;
-    n = sscanf("  12 -34 0x56 abc", "%d%d %x %s", &a, &b, &x, s);
-    printf("%d %d %d %u %s\\n", n, a, b, x, s);
-    n = sscanf("D,100,-200\\r\\n", "D,%d,%d", &a, &b);
-    printf("%d %d %d\\n", n, a, b);
-    n = sscanf("3.25,-1e3 99999999999x", "%f,%lf%lld%n", &f, &d, &w, &a);
-    printf("%d %f %f %ld%05ld %d\\n", n, (double)f, d, (long)(w / 100000), (long)(w % 100000), a);
-    n = sscanf("key=va lue;123", "%[a-z]=%[^;];%2hhu", s, t, &h);
-    printf("%d [%s][%s]%u\\n", n, s, t, h);
-    n = sscanf("abcdef", "%3c%ln%*s", c, &l);
-    printf("%d %s %ld\\n", n, c, l);
-    printf("%d", sscanf("", "%d", &a));
-    printf("%d", sscanf("x", "%d", &a));
-    printf("%d\\n", sscanf("5%", "%d%%", &a));
-    n = sscanf("010 0x1f ]y", "%i %i %[]x]", &a, &b, s);
-    printf("%d %d %d %s\\n", n, a, b, s);
-    return 0;
-}
-"""
-SCANNED = """\
-4 12 -34 86 abc
-2 100 -200
-3 3.250000 -1000.000000 99999999999 21
-3 [key][va lue]12
-1 abc 3
--101
-3 8 31 ]
-"""
-
-
-@pytest.mark.parametrize("level", ["-O0", "-Os"])
-def test_scanf_reads_what_c_says(level: str, tmp_path: Path) -> None:
-    """scanf reads as C11 7.21.6.2 says; the expected text is the output of a hosted C library for the same program."""
-    (tmp_path / "main.c").write_text(SCANF.replace("\\\\", "\\"))
-    image = tmp_path / "main.elf"
-    assert driver.main([level, str(tmp_path / "main.c"), "-o", str(image)]) == 0
-    assert run(image, engine="auto").uart.decode() == SCANNED
-
-
 HANDLERS = """
 #include <xc.h>
 int saved = 7, entered, kept = 5;
@@ -446,22 +319,6 @@ def test_attributes_of_place_stand_on_variables_constants_and_functions_of_one_f
     }
     """
     assert status_of(tmp_path, source, level) == 66
-
-
-def test_a_macro_called_like_a_configuration_word(tmp_path: Path) -> None:
-    """A program's macro may have the name of a configuration word (`#define FOSC 7372800`)."""
-    source = """
-    #include <p30F6014A.h>
-    #define FOSC 7.3728e6
-    #define FWDT
-    _FOSC(CSW_FSCM_OFF & XT_PLL8);
-    _FWDT(WDT_OFF)
-    int main(void) { return FOSC == 7.3728e6 ? 0 : 1; }
-    """
-    assert status_of(tmp_path, source) == 0
-    image = load_image(tmp_path / "main.elf")
-    words = {word.name: image.word(word.address) for word in image.chip.config.values()}
-    assert ((words["FOSC"] or 0) & 0xFFFF, (words["FWDT"] or 0) & 0xFFFF) == (0xFFE6, 0x7FFF)
 
 
 OLD_C = """

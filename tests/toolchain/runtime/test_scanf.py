@@ -190,3 +190,46 @@ def test_an_incomplete_number_is_no_number(tmp_path: Path) -> None:
     ]
     got = [int(line.split()[0]) for line in answers(cases, ["sscanf"], tmp_path, "-Os")]
     assert got == list(INCOMPLETE.values())
+
+
+SCANF = """
+#include <stdio.h>
+int main(void)
+{
+    int a = 0, b = 0; long l; long long w; char s[20], t[20], c[4] = {0}; float f; double d; unsigned char h;
+    unsigned x; int n;
+    n = sscanf("  12 -34 0x56 abc", "%d%d %x %s", &a, &b, &x, s);
+    printf("%d %d %d %u %s\\n", n, a, b, x, s);
+    n = sscanf("D,100,-200\\r\\n", "D,%d,%d", &a, &b);
+    printf("%d %d %d\\n", n, a, b);
+    n = sscanf("3.25,-1e3 99999999999x", "%f,%lf%lld%n", &f, &d, &w, &a);
+    printf("%d %f %f %ld%05ld %d\\n", n, (double)f, d, (long)(w / 100000), (long)(w % 100000), a);
+    n = sscanf("key=va lue;123", "%[a-z]=%[^;];%2hhu", s, t, &h);
+    printf("%d [%s][%s]%u\\n", n, s, t, h);
+    n = sscanf("abcdef", "%3c%ln%*s", c, &l);
+    printf("%d %s %ld\\n", n, c, l);
+    printf("%d", sscanf("", "%d", &a));
+    printf("%d", sscanf("x", "%d", &a));
+    printf("%d\\n", sscanf("5%", "%d%%", &a));
+    n = sscanf("010 0x1f ]y", "%i %i %[]x]", &a, &b, s);
+    printf("%d %d %d %s\\n", n, a, b, s);
+    return 0;
+}
+"""
+SCANNED = """\
+4 12 -34 86 abc
+2 100 -200
+3 3.250000 -1000.000000 99999999999 21
+3 [key][va lue]12
+1 abc 3
+-101
+3 8 31 ]
+"""
+
+
+@pytest.mark.parametrize("level", ["-O0", "-Os"])
+def test_scanf_reads_what_c_says(level: str, tmp_path: Path) -> None:
+    """scanf reads as C11 7.21.6.2 says; the expected text is the output of a hosted C library for the same program."""
+    (tmp_path / "main.c").write_text(SCANF)
+    assert build([tmp_path / "main.c"], tmp_path / "main.elf", level).status == 0
+    assert run(tmp_path / "main.elf").uart.decode() == SCANNED
