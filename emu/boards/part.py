@@ -39,9 +39,7 @@ class BoardPart:
 
     def array(self, purpose: str, kind: str, count: int) -> memoryview[int]:
         """Reserve `count` elements of state ("B", "H", "I" or "Q"), named `<part>.<purpose>` in the record."""
-        field = self.record.reserve(f"{self.name}.{purpose}", kind, count)
-        view = {"B": self.record.u8, "H": self.record.u16, "I": self.record.u32, "Q": self.record.u64}[kind]
-        return view[field.index : field.index + count]
+        return self.record.reserve_array(f"{self.name}.{purpose}", kind, count)
 
     def slot(self, purpose: str, fire: Callable[[int], None]) -> int:
         """Reserve an event slot that calls `fire`."""

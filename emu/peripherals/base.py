@@ -58,7 +58,7 @@ class StateCell:
 
     def __init__(self, record: Record, name: str, kind: str, initial: int = 0) -> None:
         self.index: Final = record.reserve(name, kind).index
-        self._view: Final = {"B": record.u8, "H": record.u16, "I": record.u32, "Q": record.u64, "q": record.s64}[kind]
+        self._view: Final = record.view(kind)
         self._view[self.index] = initial
         self.cell: Final = cell_of(record, name)
         """The scalar as an operand for rules."""
@@ -125,9 +125,7 @@ class Peripheral(Device):
 
     def array(self, purpose: str, kind: str, count: int) -> memoryview[int]:
         """Reserve `count` elements of hidden state ("B", "H", "I" or "Q"), named `<device>.<purpose>`."""
-        field = self.record.reserve(f"{self.name}.{purpose}", kind, count)
-        view = {"B": self.record.u8, "H": self.record.u16, "I": self.record.u32, "Q": self.record.u64}[kind]
-        return view[field.index : field.index + count]
+        return self.record.reserve_array(f"{self.name}.{purpose}", kind, count)
 
     def timestamp(self, purpose: str, initial: int = 0) -> StateCell:
         """Reserve a timestamp: a cell that holds a cycle number of this device's clock."""

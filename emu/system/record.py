@@ -68,6 +68,15 @@ class Record:
         self.fields[name] = field
         return field
 
+    def reserve_array(self, name: str, kind: str, count: int) -> memoryview[int]:
+        """Reserve elements as `reserve` does, and return a view of them."""
+        field = self.reserve(name, kind, count)
+        return self.view(kind)[field.index : field.index + count]
+
+    def view(self, kind: str) -> memoryview[int]:
+        """Return the view of the whole record for elements of `kind`. Raises KeyError for an unknown kind."""
+        return {"B": self.u8, "H": self.u16, "I": self.u32, "Q": self.u64, "q": self.s64}[kind]
+
     def reserve_addresses(self, count: int) -> int:
         """Reserve `count` zeroed 64-bit words for host addresses. Return the byte offset of the first.
 

@@ -219,11 +219,6 @@ class Infrared(BoardPart):
         self.ambient[sensor] = counts
         self._predict(sensor % len(PULSE_PINS))
 
-    def is_lit(self, sensor: int) -> bool:
-        """Whether the emitter of a sensor is on, for other robots' sensors."""
-        self._apply_edges()
-        return bool(self._lit[sensor % len(PULSE_PINS)])
-
     def lines_lit(self) -> list[bool]:
         """Return, for each pulse line, whether its two emitters are on."""
         self._apply_edges()
