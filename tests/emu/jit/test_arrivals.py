@@ -12,7 +12,7 @@ from emu.debug.history import History
 from emu.dspic30f.jit.engine import JitEngine
 from emu.instruments.coverage import Counts, count_executions
 from emu.system.arrivals import ROOM
-from toolchain.driver import driver
+from tests.emu.jit.comparison.compiled_program import build, machine_of
 
 SOURCE = """
 #include <p30F6014A.h>
@@ -36,18 +36,7 @@ CYCLES = 30_000
 
 @pytest.fixture(scope="module")
 def path(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("arrivals")
-    (folder / "p.c").write_text(SOURCE)
-    assert driver.main(["-Os", "-g", str(folder / "p.c"), "-o", str(folder / "p.elf")]) == 0
-    return folder / "p.elf"
-
-
-def machine_of(path: Path, engine: str) -> emu.Machine:
-    machine = emu.load(path, engine=engine, board=None)
-    if isinstance(machine.runner, JitEngine):
-        machine.runner.threshold = 1
-        machine.runner.wait = True
-    return machine
+    return build(tmp_path_factory.mktemp("arrivals"), SOURCE)
 
 
 def seen_by_hooks(path: Path) -> tuple[list[emu.Arrival], bytes]:

@@ -17,8 +17,8 @@ from emu.instruments.changes import log_changes
 from emu.instruments.vcd import WaveformRecorder
 from emu.machine.machine import Machine
 from emu.machine.stops import Stop
+from tests.emu.jit.comparison.compiled_program import build, compile_eagerly, machine_of
 from tests.emu.jit.comparison.random_firmware import load, random_firmware
-from toolchain.driver import driver
 
 SOURCE = """
 #include <p30F6014A.h>
@@ -51,17 +51,7 @@ CYCLES = 40_000
 
 @pytest.fixture(scope="module")
 def path(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("changes")
-    (folder / "p.c").write_text(SOURCE)
-    assert driver.main(["-Os", "-g", str(folder / "p.c"), "-o", str(folder / "p.elf")]) == 0
-    return folder / "p.elf"
-
-
-def machine_of(path: Path, engine: str) -> emu.Machine:
-    machine = emu.load(path, engine=engine, board=None)
-    if isinstance(machine.runner, JitEngine):
-        machine.runner.threshold = 1
-    return machine
+    return build(tmp_path_factory.mktemp("changes"), SOURCE)
 
 
 def watched_by(machine: emu.Machine) -> list[Watched]:
@@ -203,9 +193,8 @@ int main(void) {
 
 def test_a_boundary_with_two_interrupts_is_logged_once(tmp_path: Path) -> None:
     """Native code enters the first; the event of the output compare, which Python fires, requests the second."""
-    (tmp_path / "p.c").write_text(NESTED)
-    assert driver.main(["-Os", "-g", str(tmp_path / "p.c"), "-o", str(tmp_path / "p.elf")]) == 0
-    stepping, machine = machine_of(tmp_path / "p.elf", "plain"), machine_of(tmp_path / "p.elf", "jit")
+    image = build(tmp_path, NESTED)
+    stepping, machine = machine_of(image, "plain"), machine_of(image, "jit")
     watched: list[Watched] = ["asleep", "ipl"]
     expected = stepped(stepping, watched, CYCLES)
     levels = [one.value for one in expected if one.number == 1]
@@ -224,8 +213,7 @@ def test_random_firmware(seed: int) -> None:
     for engine in ("plain", "jit"):
         machine = Machine(engine=engine)
         machine.stop_on_fault = False
-        if isinstance(machine.runner, JitEngine):
-            machine.runner.threshold = 1
+        compile_eagerly(machine)
         load(machine, random_firmware(seed))
         results.append(
             stepped(machine, watched, 6_000) if engine == "plain"

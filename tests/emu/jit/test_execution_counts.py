@@ -7,11 +7,11 @@ from pathlib import Path
 import pytest
 
 import emu
-from emu.dspic30f.jit.engine import JitEngine
 from emu.image.loader import load_image
 from emu.instruments.coverage import Counts, count_executions
 from emu.machine.machine import Machine
 from emu.profile.cycle_shares import Profiler
+from tests.emu.jit.comparison.compiled_program import build, compile_eagerly
 from tests.emu.jit.comparison.random_firmware import load, random_firmware
 from toolchain.driver import driver
 
@@ -35,8 +35,7 @@ int main(void) {
 def counted(machine: Machine, cycles: int) -> tuple[Counts, bytes]:
     """Run with counters and return the counts and the final state."""
     counts = Counts()
-    if isinstance(machine.runner, JitEngine):
-        machine.runner.threshold = 1
+    compile_eagerly(machine)
     stop = count_executions(machine, counts)
     machine.run(cycles=cycles)
     stop()
@@ -45,10 +44,7 @@ def counted(machine: Machine, cycles: int) -> tuple[Counts, bytes]:
 
 @pytest.fixture(scope="module")
 def image(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("counts")
-    (folder / "p.c").write_text(SOURCE)
-    assert driver.main(["-Os", "-g", str(folder / "p.c"), "-o", str(folder / "p.elf")]) == 0
-    return folder / "p.elf"
+    return build(tmp_path_factory.mktemp("counts"), SOURCE)
 
 
 def test_a_program_with_interrupts_loops_and_polls(image: Path) -> None:
@@ -101,8 +97,7 @@ def test_a_repeat_with_a_count_of_0_counts_for_itself(tmp_path: Path) -> None:
         counted_one, _ = counted(emu.load(target, engine=engine, board=None), 3_000)
         counts.append((counted_one.executed, counted_one.taken))
         machine = emu.load(target, engine=engine, board=None)
-        if isinstance(machine.runner, JitEngine):
-            machine.runner.threshold = 1
+        compile_eagerly(machine)
         profiles.append(Profiler(machine, image).run(3_000).addresses)
     assert counts[0] == counts[1]
     assert profiles[0] == profiles[1]

@@ -15,7 +15,7 @@ from emu.debug.expressions.condition_filters import filter_of
 from emu.debug.expressions.expression import evaluate, number_of
 from emu.debug.history import History
 from emu.dspic30f.jit.engine import JitEngine
-from toolchain.driver import driver
+from tests.emu.jit.comparison.compiled_program import build, machine_of
 
 SOURCE = """
 #include <p30F6014A.h>
@@ -49,17 +49,7 @@ CONDITIONS = [
 
 @pytest.fixture(scope="module")
 def image(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("filters")
-    (folder / "p.c").write_text(SOURCE)
-    assert driver.main(["-Os", "-g", str(folder / "p.c"), "-o", str(folder / "p.elf")]) == 0
-    return folder / "p.elf"
-
-
-def machine_of(image: Path, engine: str) -> emu.Machine:
-    machine = emu.load(image, engine=engine, board=None)
-    if isinstance(machine.runner, JitEngine):
-        machine.runner.threshold, machine.runner.wait = 1, True
-    return machine
+    return build(tmp_path_factory.mktemp("filters"), SOURCE)
 
 
 def stops(machine: emu.Machine, condition: str, place: str = "mark") -> tuple[list[int], int]:

@@ -9,11 +9,11 @@ import pytest
 
 import emu
 from emu.debug.disassembly import instruction
-from emu.dspic30f.jit.engine import JitEngine
 from emu.image.loader import load_image
 from emu.image.model import Image
 from emu.instruments.trace import HEADER, SILENT, Tracer
 from emu.machine.machine import Machine
+from tests.emu.jit.comparison.compiled_program import compile_eagerly
 from tests.emu.jit.comparison.random_firmware import load, random_firmware
 from toolchain.driver import driver
 
@@ -118,8 +118,7 @@ def test_random_firmware(seed: int) -> None:
     for engine in ("stepped", "jit"):
         machine = Machine(engine=engine.replace("stepped", "plain"))
         machine.stop_on_fault = False
-        if isinstance(machine.runner, JitEngine):
-            machine.runner.threshold = 1
+        compile_eagerly(machine)
         load(machine, random_firmware(seed))
         texts.append(stepped(machine, image, 2_500) if engine == "stepped" else traced(machine, image, 2_500, 900))
         states.append(machine.snapshot())

@@ -15,6 +15,7 @@ from emu.dspic30f.jit.cache import ObjectCache
 from emu.dspic30f.jit.engine import JitEngine
 from emu.dspic30f.jit.translate.region import Region, Step
 from emu.machine.machine import Machine
+from tests.emu.jit.comparison.compiled_program import compile_eagerly
 from tests.emu.jit.comparison.random_firmware import (
     Firmware,
     difference,
@@ -36,9 +37,7 @@ def own_cache(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.Monk
 def eager(engine: str = "jit", ipl_slip: int = 0) -> Machine:
     """Return a machine that compiles each address before it runs it."""
     machine = Machine(engine=engine, ipl_slip=ipl_slip)
-    if isinstance(machine.runner, JitEngine):
-        machine.runner.threshold = 1
-        machine.runner.wait = True
+    compile_eagerly(machine)
     return machine
 
 

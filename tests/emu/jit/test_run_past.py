@@ -5,17 +5,15 @@ from __future__ import annotations
 import pytest
 
 from emu.chips.dspic30f6014a import DSPIC30F6014A
-from emu.dspic30f.jit.engine import JitEngine
 from emu.machine.machine import Machine
 from tests.emu.cpu.cpu_rig import START, assemble
+from tests.emu.jit.comparison.compiled_program import compile_eagerly
 from tests.emu.jit.comparison.random_firmware import difference, load, random_firmware
 
 
 def machine(engine: str, seed: int) -> Machine:
     made = Machine(engine=engine)
-    if isinstance(made.runner, JitEngine):
-        made.runner.threshold = 1
-        made.runner.wait = True
+    compile_eagerly(made)
     load(made, random_firmware(seed))
     return made
 
@@ -85,9 +83,7 @@ def test_a_limit_among_exceptions_counts_behind_the_last(engine: str, compare: i
     for name in ended:
         made = Machine(engine=name)
         made.stop_on_fault = False
-        if isinstance(made.runner, JitEngine):
-            made.runner.threshold = 1
-            made.runner.wait = True
+        compile_eagerly(made)
         for at, word in (words | vectors).items():
             made.program.put(at, word)
         made.run_until(20)
