@@ -19,13 +19,20 @@ static const f64 *centre(const struct grid *g, const f64 *poses, i64 body)
     return body < g->robots ? poses + 3 * body : poses + 3 * g->robots + 2 * (body - g->robots);
 }
 
-static i64 cell_at(const struct grid *g, const f64 *place)
+// Return a number as an index from 0 to `end`; 0 if it is not a number.
+static i64 clamped(f64 value, i64 end)
 {
-    i64 column = (i64)((place[0] - g->left) / g->cell), row = (i64)((place[1] - g->low) / g->cell);
-    return row * g->columns + column;
+    return value > (f64)end ? end : value > 0 ? (i64)value : 0;
 }
 
-// Sort the bodies into cells, at most two cells per body and one more.
+static i64 cell_at(const struct grid *g, const f64 *place)
+{
+    i64 column = clamped((place[0] - g->left) / g->cell, g->columns - 1);
+    return clamped((place[1] - g->low) / g->cell, g->rows - 1) * g->columns + column;
+}
+
+// Sort the bodies into cells, at most two cells per body and one more; into one cell if their extent is not a finite
+// number.
 void fill_grid(struct grid *g, const f64 *poses, i64 robots, i64 objects)
 {
     g->robots = robots, g->bodies = robots + objects;
@@ -41,7 +48,9 @@ void fill_grid(struct grid *g, const f64 *poses, i64 robots, i64 objects)
     }
     f64 width = right - g->left, depth = high - g->low, count = (f64)g->bodies;
     g->cell = max(max(sqrt(width * depth / count), (width + depth) / count), 2 * g->radius);
-    g->columns = (i64)(width / g->cell) + 1, g->rows = (i64)(depth / g->cell) + 1;
+    g->columns = g->rows = 1;
+    if (width < __builtin_inf() && depth < __builtin_inf() && g->cell < __builtin_inf())
+        g->columns += (i64)(width / g->cell), g->rows += (i64)(depth / g->cell);
     i64 cells = g->columns * g->rows;
     for (i64 i = 0; i <= cells; i++)
         g->first[i] = 0;
@@ -118,11 +127,6 @@ static void test_cell(struct view *v, const f64 *poses, const struct rays *rays,
     }
 }
 
-static i64 clamped(f64 value, i64 end)
-{
-    return value < 0 ? 0 : value > (f64)end ? end : (i64)value;
-}
-
 // Test the cells with bodies whose centres are between two depths, and whose discs the rays can hit.
 static void test_band(struct view *v, const f64 *poses, const struct rays *rays, struct beam *beams, struct grid *g,
                       f64 from, f64 to)
@@ -156,6 +160,10 @@ static void test_bodies(struct view *v, const f64 *poses, const struct rays *ray
 {
     f64 from = -1.1 * g->radius, step = g->cell, end = min(end_of_grid(v, g), v->range + 1.1 * g->radius);
     g->looks++;
+    if (g->columns * g->rows == 1) {
+        test_cell(v, poses, rays, beams, g, 0);
+        return;
+    }
     for (i64 open = 1; open && from <= end; from += step) {
         test_band(v, poses, rays, beams, g, from, from + step);
         open = 0;

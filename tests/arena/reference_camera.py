@@ -73,9 +73,11 @@ class ReferenceCamera:
                 if radius:
                     self._collect([place], radius, height, kind)
         self._sides = self._visible_sides(appearance, poses) if appearance is not None else []
-        others = [(one[0], one[1]) for index, one in enumerate(poses.robots) if index != own]
         self._robot = appearance.robot if appearance is not None else ROBOT
-        self._collect(others, dimensions.ROBOT_RADIUS, dimensions.ROBOT_HEIGHT, self._robot)
+        for index, (x, y, _) in enumerate(poses.robots):
+            if index != own:
+                body = scene.robot_kind(index)
+                self._collect([(x, y)], body.radius_cm, body.height_cm, self._robot)
         self.discs.sort()
         self._lit = [
             (*self._in_camera_frame(x, y), turned - heading - traits.yaw, lit)

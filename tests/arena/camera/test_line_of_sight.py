@@ -9,7 +9,7 @@ import pytest
 
 from arena.camera.appearance import NOTHING, OBJECT, ROBOT
 from arena.camera.line_of_sight import LineOfSight
-from arena.scene.loader import load_scene
+from arena.scene.loader import load_scene, scene_of
 from arena.scene.robot_kind import Traits
 from arena.world.poses import Poses
 from tests.arena.reference_camera import ReferenceCamera, sensor_of
@@ -41,6 +41,40 @@ def test_answers_equal_the_reference_in_swarms_of_any_size_and_density(
             assert seen == sensor_of(camera), f"seed {base_seed()}: {robots} robots, {objects} objects, from {own}"
             answers.add(seen)
     assert answers == {NOTHING, OBJECT, ROBOT}
+
+
+def test_answers_equal_the_reference_among_bodies_of_several_kinds() -> None:
+    """Kilobots, large and small discs, polygons, obstacles: the answer equals that of the reference camera."""
+    draw = random.Random(base_seed())
+    triangle, square = [[0, 0], [9, 0], [0, 9]], [[110, 90], [125, 90], [125, 105], [110, 105]]
+    answers = set()
+    for is_walled in (True, False):
+        scene = scene_of({
+            "name": "kinds", "arena": {"walls": is_walled},
+            "robots": [{"count": 6}, {"kind": "kilobot", "image": "gradient", "count": 20}],
+            "objects": [{"count": 8, "radius_cm": 9.0, "height_cm": 40.0, "colour": "green"},
+                        {"count": 8, "radius_cm": 1.0}, {"count": 4, "polygon": triangle}],
+            "obstacles": [{"polygon": square}, {"x_cm": 200, "y_cm": 200, "radius_cm": 12, "colour": "red"}],
+        })  # fmt: skip
+        for _ in range(60):
+            places = [(draw.uniform(5, 295), draw.uniform(5, 295), draw.uniform(-3, 3)) for _ in range(46)]
+            poses = Poses(places[:26], [*((x, y) for x, y, _ in places[26:42]), *places[42:]])
+            own = draw.randrange(6)
+            seen = LineOfSight(scene, own).look(poses)
+            assert seen == sensor_of(ReferenceCamera(scene, poses, own)), f"seed {base_seed()}: robot {own} of {places}"
+            answers.add(seen)
+    assert answers == {NOTHING, OBJECT, ROBOT}
+
+
+def test_a_body_at_no_finite_place_hides_no_other() -> None:
+    """A robot sees what is before it although other bodies are at places that are no or not finite numbers."""
+    draw, odd = random.Random(base_seed()), (math.inf, -math.inf, math.nan, 1e300, -1e300, 1e160)
+    scene = load_scene("clustering").with_values(robots__count=40, objects__count=40, arena__walls=False)
+    for _ in range(200):
+        places = [(draw.choice(odd), draw.choice((5.0, *odd))) for _ in range(78)]
+        poses = Poses([(100.0, 100.0, 0.0), *((x, y, 0.0) for x, y in places[:39])], [(120.0, 100.0), *places[39:]])
+        seen = LineOfSight(scene, 0).look(poses)
+        assert seen == OBJECT or any(map(math.isnan, poses.values))
 
 
 def test_a_look_within_a_quantum_is_made_from_the_extrapolated_pose() -> None:
