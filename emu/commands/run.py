@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import argparse
 import contextlib
-import json
 import sys
 from collections.abc import Iterator
 from contextlib import ExitStack
-from dataclasses import asdict, dataclass
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any, Final, TextIO
 
@@ -17,11 +15,12 @@ from emu.commands import kilobot_board
 from emu.commands.board_options import add_board_options, add_watch_option, board_of, links_of, set_up, start_watch
 from emu.commands.image_option import add_chip_option, image_of
 from emu.host.command import CommandError, Parser, cycles, seconds
-from emu.host.exit_status import DONE, FAULT, FAULT_AS_STATUS, INTERRUPTED, LIMIT_AS_STATUS
+from emu.host.exit_status import DONE, FAULT
 from emu.host.files import atomic_text_file
 from emu.image.model import Image
 from emu.run.input_log import HEADER, TimestampedInput, read_input_log
 from emu.run.session import FOREVER, Session
+from emu.run.summary import RunResult, firmware_status, report
 from emu.run.uart_backends import SPECIFICATIONS, ConsolePort, open_port
 
 if TYPE_CHECKING:
@@ -30,9 +29,6 @@ if TYPE_CHECKING:
     from emu.instruments.trace import Tracer
     from emu.instruments.vcd import WaveformRecorder
     from emu.machine.stops import Stop
-
-EXIT_SYMBOL: Final = "__exit_status"
-"""Symbol of the variable in which the start-up code stores main's result before it sleeps forever."""
 
 STATISTICS: Final = "os_statistics"
 REFUSED: Final = 6
@@ -101,16 +97,6 @@ def parser() -> Parser:
     return made
 
 
-@dataclass(frozen=True, slots=True)
-class RunResult:
-    """Result of a run: the stop, the host time, the bytes that each UART lost, and captured UART output."""
-
-    stop: Stop
-    host_seconds: float
-    lost: dict[int, int]
-    captured: dict[int, bytearray]
-
-
 def run(options: argparse.Namespace) -> int:
     """Run the command. Return the exit status as listed in DESCRIPTION."""
     if options.board == kilobot_board.BOARD:
@@ -126,7 +112,7 @@ def run(options: argparse.Namespace) -> int:
     with ExitStack() as stack:
         result = _run_session(options, machine, image, replay, stack)
     status = _status(options, machine, image, result.stop)
-    _report(options, machine, image, result, status)
+    report(machine, image, result, status, as_json=options.json, with_statistics=options.stats)
     if native_address is not None:
         _dump_native(native_address, machine, image, options.dump_native)
     return status
@@ -194,22 +180,8 @@ def _checked_start(machine: Machine, image: Image, stop: Stop) -> Stop:
 def _status(options: argparse.Namespace, machine: Machine, image: Image, stop: Stop) -> int:
     """Return the exit status as listed in DESCRIPTION."""
     if options.exit_code:
-        return exit_status(machine, image, stop)
+        return firmware_status(machine, image, stop)
     return FAULT if stop.reason == "fault" else DONE
-
-
-def _report(options: argparse.Namespace, machine: Machine, image: Image, result: RunResult, status: int) -> None:
-    """Print why the run ended: text on standard error, or one JSON object on standard output."""
-    facts = _facts(machine, image, result.stop, result.host_seconds)
-    if options.stats:
-        facts["stats"] = _statistics(machine, result.host_seconds)
-    for number, count in result.lost.items():
-        print(f"emu run: UART{number}: {count} bytes lost; the host side did not read them", file=sys.stderr)
-    if options.json:
-        facts |= {f"uart{number}": bytes(data).decode("latin-1") for number, data in result.captured.items()}
-        print(json.dumps(facts | {"status": status}))
-    else:
-        _print_end(facts, result.stop)
 
 
 def _native_address(machine: Machine, text: str) -> int:
@@ -355,74 +327,3 @@ def _waveforms(options: argparse.Namespace, machine: Machine, stream: TextIO, ad
         return WaveformRecorder(machine, stream, options.vcd_watch, advance)
     except ValueError as error:
         raise CommandError(str(error)) from None
-
-
-def exit_status(machine: Machine, image: Image, stop: Stop) -> int:
-    """Return the exit status for --exit-code."""
-    if stop.reason == "fault":
-        return FAULT_AS_STATUS
-    if stop.reason == "breakpoint":
-        return int(machine.peek("W0")) & 0xFF
-    if stop.reason == "halt":
-        symbol = image.symbols.find(EXIT_SYMBOL)
-        return int(machine.peek(symbol.address)) & 0xFF if symbol is not None else DONE
-    return INTERRUPTED if stop.reason == "interrupted" else LIMIT_AS_STATUS
-
-
-def _facts(machine: Machine, image: Image, stop: Stop, host_seconds: float) -> dict[str, Any]:
-    """Return the content of the summary line as data."""
-    seconds = machine.peripherals.seconds(stop.cycle)
-    facts: dict[str, Any] = {
-        "reason": stop.reason,
-        "pc": stop.pc,
-        **_place(image, stop.pc),
-        "cycles": stop.cycle,
-        "seconds": seconds,
-        "host_seconds": host_seconds,
-        "speed": seconds / host_seconds if host_seconds else None,
-        "engine": machine.engine,
-    }
-    if stop.fault is not None:
-        facts["fault"] = stop.fault.facts()
-    return facts
-
-
-def _statistics(machine: Machine, host_seconds: float) -> dict[str, Any]:
-    """Return the engine's counters, the number of resets, and the host time per activity."""
-    runner = machine.runner
-    counts = getattr(runner, "counts", None)
-    facts = {"engine": machine.engine, "resets": len(machine.resets), **(asdict(counts) if counts else {})}
-    seconds: dict[str, float] | None = getattr(runner, "seconds", None)
-    if seconds is not None:
-        facts["interrupts entered natively"] = getattr(runner, "interrupts", 0)
-        facts |= {f"seconds in {activity}": round(spent, 3) for activity, spent in seconds.items()}
-        facts["seconds in events and console"] = round(max(host_seconds - sum(seconds.values()), 0.0), 3)
-    return facts
-
-
-def _place(image: Image, pc: int) -> dict[str, str | None]:
-    line = image.lines.find(pc)
-    return {
-        "symbol": image.symbols.text(pc) if image.symbols.code(pc) else None,
-        "line": str(line) if line else None,
-    }
-
-
-def _where(place: dict[str, Any]) -> str:
-    names = ", ".join(place[key] for key in ("symbol", "line") if place[key])
-    return f"{place['pc']:#08x} ({names})" if names else f"{place['pc']:#08x}"
-
-
-def _print_end(facts: dict[str, Any], stop: Stop) -> None:
-    """Print the fault, if any, and the summary line."""
-    sys.stdout.flush()
-    if stop.fault is not None:
-        print(f"emu run: {stop.fault.report()}", file=sys.stderr)
-    for name, value in facts.get("stats", {}).items():
-        print(f"emu run: {name}: {value}", file=sys.stderr)
-    where = stop.fault.where if stop.fault is not None else _where(facts)
-    print(
-        f"{facts['reason']} at {where} after {facts['cycles']:,} cycles,"
-        f" {facts['seconds']:.6f} s simulated, {facts['speed'] or 0:.3g} x real time",
-        file=sys.stderr,
-    )
