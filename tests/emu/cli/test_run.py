@@ -331,7 +331,7 @@ def test_a_run_on_a_terminal_takes_typed_input(build):
         (["--uart2", "-"], "only one of the UARTs, --trace, --record and --json can use standard output"),
         (["--uart1", "tcp:x"], "expected tcp:PORT"),
         (["--uart1", "/nowhere/log"], "/nowhere/log: No such file or directory"),
-        (["--break", "nowhere"], "no symbol 'nowhere'"),
+        (["--break", "nowhere"], "'nowhere': not in the program"),
         (["--break", "counter"], "not code"),
         (["--break", "0x101"], "0x101 is not a program address; expected an even number, 0 to 0x7ffffe"),
         (["--break", "-2"], "-2 is not a program address"),
