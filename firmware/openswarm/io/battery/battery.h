@@ -5,7 +5,7 @@
 
 #include "openswarm.h"
 
-/* MTHI | no | 8 | 4.  True: below 3.4 V; the motors should stop soon. */
+/* MTHI | no | 12 | 8 | none.  True: below 3.4 V; the motors should stop soon. */
 bool Sys_Is_BatteryLow(void);
 
 #endif

@@ -30,7 +30,8 @@ enum { SYS_BLUETOOTH_RECEIVED = 0x15 };
  * context. */
 typedef bool (*sys_bluetooth_processor)(const char *line, uint16 size);
 bool Sys_Default_BluetoothProcessor(const char *line, uint16 size); /* the commands above */
-sys_bluetooth_processor Sys_Set_BluetoothProcessor(sys_bluetooth_processor processor); /* MTH; NULL: default */
+/* MTH | no | 15 | 4 | none.  NULL: default. */
+sys_bluetooth_processor Sys_Set_BluetoothProcessor(sys_bluetooth_processor processor);
 
 /* Rx- and Tx-processor of UART1 under this driver: a message is a line; CR LF is added unless it ends with LF. */
 uint16 Sys_Line_Rx(uint8 byte, uint8 *buffer, uint16 *used);

@@ -16,12 +16,15 @@ enum {
 typedef bool (*sys_camera_processor)(const uint8 *frame, sys_colour *colour);
 
 bool Sys_LineOfSight_Processor(const uint8 *frame, sys_colour *colour); /* the default: line_of_sight.h */
-sys_camera_processor Sys_Set_CameraProcessor(sys_camera_processor processor); /* MTH */
+/* MTH | no | 55 | 16 | none. */
+sys_camera_processor Sys_Set_CameraProcessor(sys_camera_processor processor);
 
 /* M | 20 ms, polls the I2C bus | - | 60 | none.  Between Sys_Init_Kernel and Sys_Start_Kernel. False: no camera
  * answers; the program runs without its events. */
 bool Sys_Start_Camera(void);
-uint16 Sys_Get_CameraType(void); /* MTHI.  0 = none, 0x3030, 0x6030, 0x8030 */
-const uint8 *Sys_Get_CameraFrame(void); /* MTHI.  The capture buffer */
+/* MTHI | no | 4 | 4 | none.  0 = none, 0x3030, 0x6030, 0x8030. */
+uint16 Sys_Get_CameraType(void);
+/* MTHI | no | 4 | 4 | none.  The capture buffer. */
+const uint8 *Sys_Get_CameraFrame(void);
 
 #endif

@@ -8,7 +8,7 @@
 
 enum { SYS_I2C_TIMEOUT_MS = 25 };
 
-/* M | no | - | 30.  Between Sys_Init_Kernel and Sys_Start_Kernel; drivers that poll the bus run before or after it. */
+/* M | no | - | 30 | none.  Between Sys_Init_Kernel and Sys_Start_Kernel; drivers that poll the bus run before or after it. */
 void Sys_Start_I2C(void);
 
 /* T | until done, at most SYS_I2C_TIMEOUT_MS and 4 ms of recovery | - | 64 | CONTEXT, BUSY, MEMORY.  Returns

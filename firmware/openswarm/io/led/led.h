@@ -19,9 +19,10 @@ typedef struct {
 
 /* Receives an order before its execution and may change it; false: the order is dropped. Handler context. */
 typedef bool (*sys_led_processor)(sys_led_order *order);
-sys_led_processor Sys_Set_LEDProcessor(sys_led_processor processor); /* MTH; NULL: LED orders are executed unchanged */
+/* MTH | no | 12 | 4 | none.  NULL: LED orders are executed unchanged. */
+sys_led_processor Sys_Set_LEDProcessor(sys_led_processor processor);
 
-/* M | no | - | 40 | MEMORY.  Between Sys_Init_Kernel and Sys_Start_Kernel. Columns: openswarm.h, top. */
+/* M | no | - | 46 | MEMORY.  Between Sys_Init_Kernel and Sys_Start_Kernel. Columns: openswarm.h, top. */
 bool Sys_Start_LEDs(void);
 
 #endif

@@ -13,7 +13,8 @@ typedef struct {
 
 /* Receives a new frame and may change the command; true: it is sent as SYS_IO_REMOTECONTROL. ISR context. */
 typedef bool (*sys_remote_processor)(sys_remote_frame *frame);
-sys_remote_processor Sys_Set_RemoteProcessor(sys_remote_processor processor); /* MTHI; NULL: every frame is sent */
+/* MTHI | no | 6 | 4 | none.  NULL: every frame is sent. */
+sys_remote_processor Sys_Set_RemoteProcessor(sys_remote_processor processor);
 
 /* M | no | - | 40 | MEMORY.  Between Sys_Init_Kernel and Sys_Start_Kernel. */
 bool Sys_Start_Remote(void);

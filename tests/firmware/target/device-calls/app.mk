@@ -1,0 +1,1 @@
+DEVICES := camera i2c remote analog led bluetooth battery spi
