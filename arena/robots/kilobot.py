@@ -25,7 +25,7 @@ from emu.avr.core.state import RESTARTED
 from emu.avr.image import AvrImage, load_avr_image
 from emu.avr.machine import HZ, UDR0, Atmega328p, Change
 from emu.boards.kilobot.messages import DATA_SIZE, TYPES, Message, PulseDecoder, frame
-from emu.boards.kilobot.observer import DDRB, EMITTERS, MCUSR, PORTB, WATCHED, is_reset, led_of, motors_of
+from emu.boards.kilobot.observer import DDRB, MCUSR, PORTB, WATCHED, emits_light, is_reset, led_of, motors_of
 from emu.boards.kilobot.overhead import send_frame
 from emu.boards.kilobot.swarm import ADC7, FULL_SCALE, KilobotFaultError, KilobotSetup, KilobotSwarm, microvolts
 
@@ -219,9 +219,9 @@ class KilobotController:
         if change.register == MCUSR and is_reset(self._registers.get(MCUSR, 0), change.value):
             self._registers.clear()
             self._note_reset("by the watchdog", change.cycle)
-        was_lit = self._is_lit()
+        was_lit = emits_light(self._registers)
         self._registers[change.register] = change.value
-        if change.register in _EMITTING and self._is_lit() and not was_lit:
+        if change.register in _EMITTING and emits_light(self._registers) and not was_lit:
             message = self._decoder.pulse(change.cycle)
             if message is not None:
                 note = "" if message.is_whole else " wrong CRC"
@@ -237,10 +237,6 @@ class KilobotController:
         if at - self._reset_at >= FCY // 1000:
             self._lines.append(SerialLine(at, f"reset: {cause}"))
         self._reset_at = at
-
-    def _is_lit(self) -> bool:
-        """Whether an emitter of infrared light is on."""
-        return bool(self._registers.get(DDRB, 0) & self._registers.get(PORTB, 0) & EMITTERS)
 
     def _take_byte(self, change: Change) -> None:
         """Add a byte of the debug UART to the present line."""

@@ -24,6 +24,7 @@ LED_PINS: Final = (((DDRD, PORTD, 5), (DDRD, PORTD, 4)), ((DDRC, PORTC, 3), (DDR
                    ((DDRC, PORTC, 5), (DDRC, PORTC, 4)))  # fmt: skip
 """Pins of red, green and blue; the first counts 1, the second 2. A pin lights if it is a low output."""
 EMITTERS: Final = 0xC7
+"""Pins of port B that may be emitters (kilobot.md §1)."""
 LIGHT_BITS: Final = {DDRB: EMITTERS, PORTB: EMITTERS}
 LED_BITS: Final = {DDRC: 0x3C, PORTC: 0x3C, DDRD: 0x30, PORTD: 0x30}
 MOTOR_BITS: Final = {DDRB: 0x08, DDRD: 0x08, TCCR2A: 0xA0, TCCR2B: 0x07, OCR2A: 0xFF, OCR2B: 0xFF}
@@ -48,6 +49,11 @@ class Report:
     def __str__(self) -> str:
         fields = " ".join(f"{name}={value}" for name, value in self.content.items())
         return f"{self.seconds:.6f} {self.kind} {fields}".rstrip()
+
+
+def emits_light(registers: dict[int, int]) -> bool:
+    """Whether an emitter of infrared light is on, for these values of registers."""
+    return bool(registers.get(DDRB, 0) & registers.get(PORTB, 0) & EMITTERS)
 
 
 def led_of(registers: dict[int, int]) -> tuple[int, int, int]:
@@ -136,14 +142,14 @@ class KilobotObserver:
             self._restarted_at = change.cycle
             return
         changed = self._registers.get(change.register, 0) ^ change.value
-        was_lit = self._is_lit()
+        was_lit = emits_light(self._registers)
         self._registers[change.register] = change.value
         if change.register == MCUSR and is_reset(change.value ^ changed, change.value):
             self._registers = {MCUSR: change.value}
             yield Report(change.cycle, "reset", {"cause": "watchdog"})
             self._store_state("led", (0, 0, 0), change.cycle)
             self._store_state("motors", (0, 0), change.cycle)
-        if changed & LIGHT_BITS.get(change.register, 0) and self._is_lit() and not was_lit:
+        if changed & LIGHT_BITS.get(change.register, 0) and emits_light(self._registers) and not was_lit:
             message = self._decoder.pulse(change.cycle)
             if message is not None:
                 yield Report(change.cycle, "message", {"type": message.type, "data": message.data.hex(),
@@ -157,6 +163,3 @@ class KilobotObserver:
         """Store the state that LED or motors have from a cycle on. It is reported once it has lasted SETTLED cycles."""
         if self._waiting.get(kind, (0, self._reported[kind]))[1] != state:
             self._waiting[kind] = (cycle, state)
-
-    def _is_lit(self) -> bool:
-        return bool(self._registers.get(DDRB, 0) & self._registers.get(PORTB, 0) & EMITTERS)

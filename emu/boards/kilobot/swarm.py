@@ -25,6 +25,7 @@ from emu.avr.image import AvrImage
 from emu.avr.machine import HZ, Atmega328p, Program
 from emu.avr.native import TYPES, native
 from emu.avr.observation import STOP_NONE, Observation
+from emu.boards.kilobot.observer import EMITTERS
 from emu.native_library import ADDRESS, INT, address_of, functions_of
 
 _STOPPED: Final = 1 << 62
@@ -44,8 +45,6 @@ AREF_UV: Final = 3_000_000
 THRESHOLD_UV: Final = 500_000
 BATTERY_UV, BATTERY_NOISE_UV = 2_000_000, 31_000
 """Voltage of ADC6 at half of a battery of 4 V, and its noise, from which kilolib draws random bits. UNVERIFIED."""
-EMITTERS: Final = 0xC7
-"""Pins of port B that may be emitters (kilobot.md §1)."""
 PULSE_TICKS: Final = 9
 EDGES: Final = 256
 """Capacity of a robot's queue of light edges, without the two edges for each other robot that are added (air.c)."""
