@@ -153,8 +153,8 @@ HAL_OUTLINE void hal_stop(void)
 
 /* ---- Faults ------------------------------------------------------------------------------------------------------ */
 
-/* Handles a thread that wrote into its guard, or an interrupt that could not store its registers there. PendSV is
- * the next exception, whatever the thread has locked, and ends the thread: no stack pointer is above this limit. */
+/* Handles a thread that wrote into its guard, or an interrupt that could not store its registers there. PendSV runs
+ * next, even if the thread holds a lock. It ends the thread, because every stack pointer is below the new limit. */
 HAL_USED void cpu_guard_hit(void)
 {
     SCB_CFSR = SCB_CFSR_MEMMANAGE;
