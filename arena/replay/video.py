@@ -67,26 +67,49 @@ def frames(trial: Trial, times: list[float]) -> Iterator[Image.Image]:
     """Yield a picture for each time in s: arena from above, time and metrics, camera strips."""
     data = sample_data(trial)
     metrics = trial.experiment.curves[:2]
-    sample = 0
+    shown = [
+        [f"{time:6.1f} s", *(f"{one.label} {one.shown(data['curves'][one.name][sample])}" for one in metrics)]
+        for sample, time in enumerate(data["t"])
+    ]
+    captions = _fitted(shown, round(trial.scene.arena.width_cm * _scale(trial.scene, len(data["robots"]))))
+    least_width, sample = max(map(_text_width, captions)), 0
     for time in times:
         while sample + 1 < len(data["t"]) and data["t"][sample + 1] <= time + 1e-3:
             sample += 1
-        caption = "   ".join(f"{one.label} {one.shown(data['curves'][one.name][sample])}" for one in metrics)
-        yield _frame(trial.scene, data, sample, caption)
+        yield _frame(trial.scene, data, sample, captions[sample], least_width)
+
+
+def _fitted(captions: list[list[str]], width: int) -> list[str]:
+    """Return the captions of all frames in one line each, or with a line for each part if one is wider than `width`."""
+    joined = ["   ".join(parts) for parts in captions]
+    return joined if max(map(_text_width, joined)) <= width else ["\n".join(parts) for parts in captions]
+
+
+def _text_width(text: str) -> int:
+    """Return the width of a text with its margins, in pixels."""
+    return math.ceil(ImageDraw.Draw(Image.new("RGB", (1, 1))).multiline_textbbox((0, 0), text)[2]) + 8
+
+
+def _scale(scene: Scene, robots: int) -> float:
+    """Return the pixels per cm of a scene's pictures: its smallest robot is as large as an e-puck with `SCALE`."""
+    return (
+        SCALE
+        * EPUCK.radius_cm
+        / min((scene.robot_kind(one).radius_cm for one in range(robots)), default=EPUCK.radius_cm)
+    )
 
 
 def arena_picture(
     scene: Scene, robots: Sequence[tuple[float, float, float]], seen: Sequence[int],
     objects: Sequence[tuple[float, ...]], labels: Sequence[int], leds: Sequence[int] = (),
 ) -> Image.Image:  # fmt: skip
-    """Draw the arena from above, the smallest robot as large as an e-puck with `SCALE` pixels per cm.
+    """Draw the arena from above, in the scale of `_scale`.
 
     `robots` are poses in cm and rad, `seen` the values of their line-of-sight sensors. `objects` are x and y in cm, and
     for polygons the heading in rad. `labels` are the cluster numbers of the objects. `leds` are the
     LEDs of the robots: a Kilobot has its colour, grey if it is dark.
     """
-    least = min((scene.robot_kind(number).radius_cm for number in range(len(robots))), default=EPUCK.radius_cm)
-    scale = SCALE * (EPUCK.radius_cm / least)
+    scale = _scale(scene, len(robots))
     width, height = round(scene.arena.width_cm * scale), round(scene.arena.height_cm * scale)
     image = Image.new("RGB", (width, height), _PAPER)
     draw = ImageDraw.Draw(image)
@@ -124,22 +147,23 @@ def _led_colour(leds: int) -> tuple[int, int, int]:
     return (85 * (leds & 3), 85 * (leds >> 2 & 3), 85 * (leds >> 4 & 3)) if leds else _PALE
 
 
-def _frame(scene: Scene, data: dict[str, Any], sample: int, caption: str) -> Image.Image:
-    """Draw one frame: the arena from above, `caption`, and the camera strips."""
+def _frame(scene: Scene, data: dict[str, Any], sample: int, caption: str, least_width: int) -> Image.Image:
+    """Draw one frame of at least `least_width` pixels: the arena from above, `caption`, and the camera strips."""
     robots = [(one["x"][sample], one["y"][sample], one["heading"][sample]) for one in data["robots"]]
     seen = [one["seen"][sample] for one in data["robots"]]
     picture = arena_picture(scene, robots, seen, data["objects"][sample], data["clusters"][sample],
                             [one["leds"][sample] for one in data["robots"]])  # fmt: skip
     cameras = sum(scene.robot_kind(number).has_camera for number in range(len(robots)))
     (width, height), rows = picture.size, len(robots) if cameras else 0
-    total = height + _LINE * (rows + 1) + 4
+    width, below = max(width, least_width), height + _LINE * (caption.count("\n") + 1) + 2
+    total = below + _LINE * rows + 2
     image = Image.new("RGB", (width + width % 2, total + total % 2), _PAPER)
     image.paste(picture)
     draw = ImageDraw.Draw(image)
-    draw.text((4, height + 2), f"{data['t'][sample]:6.1f} s   {caption}", fill=_INK)
+    draw.text((4, height + 2), caption, fill=_INK, spacing=_LINE - 11)
     for number in range(rows):
         if scene.robot_kind(number).has_camera:
-            _strip(draw, number, data["robots"][number], sample, height + _LINE * (number + 1) + 2)
+            _strip(draw, number, data["robots"][number], sample, below + _LINE * number)
     return image
 
 

@@ -158,7 +158,8 @@ def test_a_film_shows_the_leds_of_kilobots(tmp_path: Path) -> None:
     trial = read_trial(tmp_path / "out/trial-0001.parquet")
     first, last = frames(trial, [0.0, 3.0])
     scale = SCALE * 3.7 / 1.65
-    assert first.size == (round(40 * scale), round(40 * scale) + 18)
+    assert first.size == (252, round(40 * scale) + 18 + 2 * 14)  # three lines: the caption is wider than the arena
+    assert first.size == last.size
     for number, colour in enumerate(((85, 0, 0), (85, 85, 0))):
         at = (10 + 5 * number + 1) * scale, 40 * scale - 10 * scale
         assert (first.getpixel(at), last.getpixel(at)) == ((221, 221, 221), colour)
