@@ -96,6 +96,23 @@ def test_interrupts_are_entered_and_left_without_python() -> None:
     assert native.runner.counts.interpreted < 40
 
 
+def test_a_write_of_splim_in_the_cycle_of_an_event_is_native() -> None:
+    """No event of a device reads SPLIM, so a write may precede an event that is due in the same cycle. The periods of
+    the timer and of the loop have no common divisor, so events meet each of its cycles."""
+    sfrs = (("PR1", 98), ("IEC0", 8), ("T1CON", 0x8000))
+    counting = words_of("INC{.B} Ws, Wd", B=0, s=2, p=0, d=2, q=0)
+    firmware, at = started(dict.fromkeys(range(15), 0) | {15: 0x900}, sfrs, counting)
+    loop = to_sfr("SPLIM", 0x1000) + words_of("INC{.B} Ws, Wd", B=0, s=1, p=0, d=1, q=0)
+    firmware.put(at, loop + words_of("BRA Expr", n=-len(loop) - 1))
+    plain, native = pair(firmware)
+    for length in (*range(1, 40), 50_000):
+        assert plain.run(length) == native.run(length)
+        assert not difference(plain, native)
+    assert isinstance(native.runner, JitEngine)
+    assert native.runner.interrupts > 450
+    assert native.runner.counts.interpreted < 20
+
+
 def test_returns_in_which_an_event_is_due_are_native() -> None:
     """RETURN and RETFIE with an event due in their last cycle are native. They take two cycles if an interrupt is
     then accepted (isa.md §7.4), which the boundary decides."""

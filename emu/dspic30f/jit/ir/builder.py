@@ -396,15 +396,16 @@ class LlvmBuilder:
 
     def _store_sfr(self, address: int, placed: Number, lanes: int) -> None:
         """Defer a write of the bits `lanes` of an SFR, by the SFR's rule if it has one, else by its kind of access."""
-        self.deferred.touches_sfr = True
         rule = self.layout.rules.get(address)
+        kind, mask = self.layout.writes.get(address, ("slow", 0))
+        is_of_cpu = kind == "plain" and address < self.layout.offset["SR"]  # no device event reads or writes it
+        self.deferred.touches_sfr |= rule is not None or not is_of_cpu
         if rule is not None and self.deferred.read_effect:  # the rule would use the device's state before the read
             raise NeedsInterpreter
         if rule is not None and rule.writes is not None and self.repeating is None:
             if not rule.writes(AccessEmitter(self), rule.operands, placed, lanes):
                 raise NeedsInterpreter
             return
-        kind, mask = self.layout.writes.get(address, ("slow", 0))
         if kind == "slow" or self.repeating is not None:
             raise NeedsInterpreter
         free = mask & lanes
