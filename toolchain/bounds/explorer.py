@@ -33,7 +33,8 @@ MAX_ITERATIONS: Final = 5_000
 NONTERMINATING_ITERATIONS: Final = 6
 """Maximum number of iterations executed of a loop that did not terminate in an earlier execution."""
 TEST_ITERATION: Final = 32
-"""Iteration before which a loop without annotation is tested for a count that its values decide."""
+"""Number of iterations after which a loop without annotation counts as endless, unless a value that changes decides
+one of its branches."""
 MAX_PUSHES: Final = 64
 """Maximum number of iterations of a loop that changes W15."""
 MAX_STEPS: Final = 500_000

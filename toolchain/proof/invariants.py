@@ -95,7 +95,8 @@ class OrderInvariant:
 def candidate_orders(rows: list[dict[ValueWord, int]], sizes: Mapping[ValueWord, int]) -> Iterator[OrderInvariant]:
     """Yield the order invariants that hold in all `rows` (values at each visit of a loop head).
 
-    A constant word gives two of them. A variable word gives signed and unsigned orders against 0 and other words.
+    A word with the same value in all rows gives two: not greater and not less than that number. A word that changes
+    is compared, signed and unsigned, with 0 and with the other words.
     """
     moving = [part for part in rows[0] if len({row[part] for row in rows}) > 1]
     for part, number in rows[0].items():
