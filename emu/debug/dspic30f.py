@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING, Any, Final
 
 from emu.debug.disassembly import instruction
 from emu.debug.dwarf.units import DebugInfo, debug_of
-from emu.debug.unwind import REGISTERS, RETURN_BYTES, STACK_POINTER, CodeAnalysis, RawFrame, Unwinder
+from emu.debug.unwind import REGISTERS, RETURN_BYTES, CodeAnalysis, RawFrame, Unwinder
 from emu.dspic30f.isa.codec import decode_for_execution
 from emu.dspic30f.isa.facts import facts_of
 from emu.dspic30f.isa.flow import Call
+from emu.dspic30f.state.state import STACK_POINTER
 from emu.image.model import Image
 
 if TYPE_CHECKING:

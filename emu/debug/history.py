@@ -18,6 +18,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
+from emu.dspic30f.state.state import STACK_POINTER
 from emu.machine.stops import SLEEP_CYCLES
 from emu.system.events import NEVER
 
@@ -35,7 +36,6 @@ FIRST_WINDOW, WIDER, WIDEST = 64, 16, 1 << 26
 
 The values are: initial number, growth factor while the CPU sleeps, maximum number.
 """
-STACK_POINTER: Final = 15
 
 
 @dataclass(frozen=True, slots=True)

@@ -18,12 +18,13 @@ from emu.dspic30f.isa.builder import Context, Side, Size
 from emu.dspic30f.isa.codec import decode_for_execution
 from emu.dspic30f.isa.flow import Branch, Call, Do, Goto, Return, Skip
 from emu.dspic30f.isa.row import Insn
+from emu.dspic30f.state.state import STACK_POINTER
 
 REGISTERS: Final = 16
-STACK_POINTER: Final = 15
 CALLEE_SAVED: Final = range(8, 16)
 """Callee-saved registers W8 to W15 (abi-elf.md §2)."""
 RETURN_BYTES: Final = 4
+"""Number of bytes that a call pushes (isa.md §7.4)."""
 MAX_INSTRUCTIONS: Final = 6000
 """Maximum number of instructions of an analysed function."""
 MAX_FRAMES: Final = 64

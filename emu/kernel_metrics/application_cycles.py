@@ -25,8 +25,10 @@ from dataclasses import dataclass, field
 from functools import partial
 from typing import TYPE_CHECKING, Final
 
+from emu.debug.unwind import RETURN_BYTES
 from emu.dspic30f.exceptions.interrupts import Accepted
-from emu.kernel_metrics.application_memory import SCHEDULER
+from emu.dspic30f.state.state import STACK_POINTER
+from emu.kernel_metrics.application_memory import ENTRY_REGISTER, SCHEDULER
 from emu.kernel_metrics.cycle_results import ApplicationCycles, Operation
 from emu.kernel_metrics.heap import Heap
 from emu.kernel_metrics.kernel_structures import KernelStructures, event_name
@@ -35,16 +37,11 @@ from emu.kernel_metrics.observation import Observation
 if TYPE_CHECKING:
     from emu.machine.machine import Machine
 
-STACK_POINTER: Final = 15
 CALL_CYCLES: Final = 2
 """Cycles of CALL and RCALL (isa.md §13.1)."""
-CALL_BYTES: Final = 4
-"""Number of bytes that a call pushes (isa.md §7.4)."""
 SLICE_VECTORS: Final = ("T2Interrupt", "C2Interrupt")
 """Vectors whose handler switches threads: the end of a slice, and a forced one (port/dspic30f/hal_port.h)."""
 MAIN: Final = "main"
-ENTRY_REGISTER: Final = 8
-"""W8 holds the entry function at `os_thread_start` (firmware/openswarm/port/dspic30f/switch.S)."""
 EVENT_REGISTER, DATA_REGISTER = 1, 2
 """W1 and W2 hold the event and the event data of a handler (abi-elf.md §2)."""
 MASKED: Final = "interrupts masked at {level}"
@@ -277,7 +274,7 @@ class _Run:
 
     def _begin_call(self, label: str) -> None:
         window, machine = self._window(), self._machine
-        top = window.stack - CALL_BYTES
+        top = window.stack - RETURN_BYTES
         back = (machine.peek(top + 2) & 0x7F) << 16 | machine.peek(top)
         calls = self._calls.setdefault(label, [])
         calls[:] = [one for one in calls if (one.context, one.stack) != (window.context, window.stack)]
@@ -287,7 +284,7 @@ class _Run:
             self.observation.at(back, lambda: self._end_call(label))
 
     def _end_call(self, label: str) -> None:
-        context, stack = self._context(), self._machine.w[STACK_POINTER] + CALL_BYTES
+        context, stack = self._context(), self._machine.w[STACK_POINTER] + RETURN_BYTES
         calls = self._calls[label]
         for window in calls:
             if (window.context, window.stack) == (context, stack):

@@ -12,13 +12,13 @@ from collections import Counter
 from typing import TYPE_CHECKING, Any, Final
 
 from emu.debug.inspector import Inspector
+from emu.debug.threads import STACK_FILL
+from emu.debug.unwind import RETURN_BYTES
 from emu.image.footprint import pieces
 from emu.image.model import Image
 from emu.kernel_metrics.blame import short
 from emu.kernel_metrics.heap import Heap
 from emu.kernel_metrics.kernel_structures import (
-    STACK_FILL,
-    WORD,
     KernelMemory,
     KernelStructures,
     ThreadMemory,
@@ -27,6 +27,7 @@ from emu.kernel_metrics.kernel_structures import (
 from emu.kernel_metrics.memory_results import ApplicationMemory, EventUse, HeapUse, ThreadUse
 from emu.kernel_metrics.observation import HookObservation, Observation, stores_to
 from emu.kernel_metrics.owners import APPLICATION, owner_of_module
+from emu.kernel_metrics.target import WORD
 
 if TYPE_CHECKING:
     from emu.machine.machine import Machine
@@ -35,8 +36,6 @@ RETURNED_BLOCK: Final = -1
 """Event identifier of a queued block that a driver returns to the kernel."""
 ENTRY_REGISTER: Final = 8
 """W8 holds the entry function at `os_thread_start` (firmware/openswarm/port/dspic30f/switch.S)."""
-RETURN_ADDRESS_BYTES: Final = 4
-"""Bytes that CALL pushes (isa.md §7.4)."""
 SYSTEM_THREAD: Final = "main"
 SCHEDULER: Final = ("os_schedule", "os_yield", "os_slice_end")
 """Functions in which the kernel, on its own stack, chooses the next thread (kernel/scheduler.c)."""
@@ -102,7 +101,7 @@ class _Run:
             return
         top, end = self.machine.w[15], self.machine.state.splim + WORD
         if top < end <= self.machine.record.data_end:
-            self._stack_of_main = range(top - RETURN_ADDRESS_BYTES, end)
+            self._stack_of_main = range(top - RETURN_BYTES, end)
             self.machine.poke(top, int.from_bytes(bytes([STACK_FILL]) * (end - top), "little"), end - top)
 
     def _measure_main(self) -> None:

@@ -13,8 +13,9 @@ from typing import TYPE_CHECKING, Final
 
 from emu.debug.dwarf.types import Type
 from emu.debug.dwarf.units import Variable, debug_of
+from emu.debug.threads import STACK_FILL
 from emu.image.model import Image
-from emu.kernel_metrics.target import MeasureError
+from emu.kernel_metrics.target import WORD, MeasureError
 
 if TYPE_CHECKING:
     from emu.machine.machine import Machine
@@ -31,8 +32,6 @@ SYSTEM_EVENTS: Final = {
 """Names of the system's events (firmware/openswarm/include, io); the compiler keeps no anonymous enumeration."""
 DRIVERS: Final = 0xFFFF
 """Owner of the drivers' subscriptions (OS_DRIVERS, kernel.h)."""
-STACK_FILL: Final = 0xA5
-"""Byte with which the kernel paints a stack (firmware/openswarm/kernel/stack.c)."""
 WOKEN: Final = 0x04
 """Bit of a ready thread's status: it was blocked before (OS_WOKEN, kernel.h)."""
 OFF_RING: Final = 0x02
@@ -40,7 +39,6 @@ OFF_RING: Final = 0x02
 PERIODIC: Final = 0x08
 """Bit of a control block's status: a `periodic` record lies in front of the stack (SYS_PERIODIC, openswarm.h)."""
 LONGEST_LIST: Final = 4096
-WORD: Final = 2
 MISSING: Final = (
     "{path} has no OpenSwarm kernel with debug information ({what} is missing): link the kernel and build with -g"
 )

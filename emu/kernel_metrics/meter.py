@@ -10,6 +10,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Final
 
+from emu.debug.unwind import RETURN_BYTES
+from emu.dspic30f.state.state import STACK_POINTER
 from emu.kernel_metrics.observation import EXCEPTION_ENTRY
 from emu.kernel_metrics.target import MeasureError, Target
 from emu.system.device import flag_since
@@ -17,11 +19,8 @@ from emu.system.events import NEVER
 
 MAX_WINDOW_CYCLES: Final = 100_000
 """Tcy after which the end of a window counts as not reachable."""
-STACK_POINTER: Final = 15
 BEFORE_WINDOW: Final = -2
 """Address under which the cycles before the first instruction of a window are counted."""
-CALL_BYTES: Final = 4
-"""Number of bytes that a call pushes (isa.md §7.4)."""
 
 
 @dataclass(slots=True)
@@ -79,7 +78,7 @@ class Meter:
     def returned(self) -> Callable[[], bool]:
         """Return a predicate: whether the function that is about to be entered has returned."""
         machine = self.machine
-        stack = machine.w[STACK_POINTER] - CALL_BYTES
+        stack = machine.w[STACK_POINTER] - RETURN_BYTES
         back = (machine.peek(stack + 2) & 0x7F) << 16 | machine.peek(stack)
         return lambda: machine.pc == back and machine.w[STACK_POINTER] == stack
 

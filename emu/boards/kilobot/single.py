@@ -5,6 +5,7 @@ from __future__ import annotations
 import struct
 from typing import Final
 
+from emu.avr.core.state import NEVER
 from emu.avr.image import AvrImage
 from emu.avr.machine import HZ, Atmega328p, Change
 from emu.avr.observation import Observation
@@ -16,7 +17,6 @@ FIRST_COMMAND: Final = HZ // 5
 """Tick of the overhead controller's first message."""
 COMMAND_TICKS: Final = HZ // 2
 """Ticks for which it repeats the message. IDLE looks at the robot's state every 201 ms (kilobot.md §2)."""
-_NEVER: Final = (1 << 64) - 1
 
 
 class SingleKilobot:
@@ -61,10 +61,10 @@ class SingleKilobot:
 
     def snapshot(self) -> bytes:
         """Return the whole state of robot, light and controller."""
-        return struct.pack("<Q", _NEVER if self.next_command is None else self.next_command) + self.swarm.snapshot()
+        return struct.pack("<Q", NEVER if self.next_command is None else self.next_command) + self.swarm.snapshot()
 
     def restore(self, snapshot: bytes) -> None:
         """Return to the state of a snapshot of this object. Raises ValueError for other bytes."""
         self.swarm.restore(snapshot[8:])
         (command,) = struct.unpack_from("<Q", snapshot)
-        self.next_command = None if command == _NEVER else command
+        self.next_command = None if command == NEVER else command
