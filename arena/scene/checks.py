@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Callable, Mapping, Sequence
 from itertools import pairwise
@@ -114,7 +115,8 @@ def check_limits(errors: TableErrors, name: str, table: Any, number: int | None 
     """Check the numbers of a table against `limits.LIMITS`. Raises SceneError."""
     for key, (low, high) in LIMITS[type(table)].items():
         value = getattr(table, key)
-        if not low <= value <= high:
+        is_omitted = math.isnan(value) and math.isnan(getattr(type(table)(), key))
+        if not low <= value <= high and not is_omitted:
             raise errors.at(name, key, f"{name}.{key} is {value}; expected {low} to {high}", number)
 
 
@@ -175,6 +177,15 @@ def check_placed(errors: TableErrors, table: str, one: Any, number: int) -> None
     if (one.place == "poses") != bool(one.poses):
         words = f'{table}.poses goes with place = "poses", and only with it'
         raise errors.at(table, "poses" if one.poses else "place", words, number)
+
+
+def check_given(errors: TableErrors, table: str, given: Mapping[str, Any], one: Any, number: int) -> None:
+    """Check that a table as it is given has no key that another one determines. Raises SceneError."""
+    if one.place == "poses" and given.get("count", one.count) != one.count:
+        words = f"{table}.count is {given['count']}, but {len(one.poses)} poses are listed; remove it"
+        raise errors.at(table, "count", words, number)
+    if getattr(one, "polygon", ()) and given.get("radius_cm", one.radius_cm) != one.radius_cm:
+        raise errors.at(table, "radius_cm", f"{table}.radius_cm has no effect beside `polygon`; remove it", number)
 
 
 def check_group(errors: TableErrors, table: str, one: RobotGroup, number: int) -> None:

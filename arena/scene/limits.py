@@ -31,6 +31,8 @@ FIRMWARE_ROBOTS: Final = 1000
 _CENTRE: Final = (-10_000, 10_000)
 _PLACED: Final = {
     "count": (0, 10_000),
+    "x_cm": _CENTRE,
+    "y_cm": _CENTRE,
     "width_cm": (0, 10_000),
     "depth_cm": (0, 10_000),
     "sd_cm": (0, 10_000),

@@ -18,6 +18,7 @@ from arena.scene.checks import (
     SceneError,
     TableErrors,
     check_colour,
+    check_given,
     check_key,
     check_limits,
     check_links,
@@ -302,19 +303,16 @@ def _scene(errors: TableErrors, data: dict[str, Any]) -> Scene:
             kind = LISTS[name]
             values[name] = tuple(_table(errors, key, kind, one, kind(), n) for n, one in enumerate(value))
         else:
-            known = ", ".join(
-                ("name", "description", "experiment", "chassis", *TABLES, "obstacles", "patches", "lamps")
-            )
-            raise errors.at(key, "", f"unexpected {key!r}; expected {known}")
+            known = "name", "description", "experiment", "chassis", *TABLES, "obstacles", "patches", "lamps"
+            raise errors.at(key, "", f"unexpected {key!r}; expected {', '.join(known)}")
     if "name" not in values:
         raise errors.at("", "name", "a scene needs a name")
     if values.get("groups") and "objects" not in values and "kinds" not in values:
         values["objects"] = Objects(count=0)  # a scene with groups of robots has only the objects it lists
     scene = _counted(Scene(**values))
-    for number, (given, one) in enumerate(zip(data.get("kinds") or data.get("objects", ()), scene.kinds, strict=False)):
-        if one.polygon and given.get("radius_cm", one.radius_cm) != one.radius_cm:
-            words = "objects.radius_cm has no effect beside `polygon`; remove it"
-            raise errors.at("objects", "radius_cm", words, number)
+    for name, long, tables in (("robots", "groups", scene.groups), ("objects", "kinds", scene.kinds)):
+        for number, (given, one) in enumerate(zip(data.get(long) or data.get(name, ()), tables, strict=False)):
+            check_given(errors, name, given, one, number)
     return scene
 
 
@@ -387,8 +385,7 @@ def _checked(scene: Scene, errors: TableErrors) -> Scene:
         words = f"{scene.robots.count} robots and {scene.objects.count} objects; expected at most 10000 of each"
         raise errors.at("robots", "count", words)
     check_colour(errors, "robots", scene.robots, None)
-    robots = range(scene.robots.count)
-    check_links(errors, scene.bluetooth.links, [scene.robot_kind(robot).name for robot in robots])
+    check_links(errors, scene.bluetooth.links, [scene.robot_kind(one).name for one in range(scene.robots.count)])
     check_off(errors, scene.start.off, scene.robots.count)
     if scene.start.robot_poses or scene.start.object_poses:
         check_start_poses(errors, "robot_poses", scene.start.robot_poses, [3] * scene.robots.count)

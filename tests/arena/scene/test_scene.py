@@ -220,6 +220,8 @@ def test_infrared_sensors_detect_obstacles_and_all_lamps(yard: Scene) -> None:
         (("count = 3", "count = 3\nheading_deg = inf"), 13, "robots.heading_deg is inf; expected -1e6 to 1e6"),
         (("count = 3", "count = -3"), 12, "robots.count is -3; expected 0 to 10000"),
         (("radius_cm = 3", f"radius_cm = 3{'0' * 400}"), 34, "objects.radius_cm: the number is too large"),
+        (("x_cm = 240", "x_cm = inf"), 31, "objects.x_cm is inf; expected -10000 to 10000"),
+        (("[[40, 200, 90]]", "[[40, 200, 90]]\ncount = 2"), 25, "robots.count is 2, but 1 poses are listed; remove it"),
         (("radius_cm = 3", 'radius_cm = "big"'), 34, "objects.radius_cm is 'big'; expected float"),
         (("height_cm = 30", "height = 30"), 41, "unknown key objects.height; expected"),
         (('place = "normal"', 'place = "gauss"'), 30, "objects.place is 'gauss'; expected marks, uniform"),
