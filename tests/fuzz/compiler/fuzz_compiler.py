@@ -31,6 +31,8 @@ from tests.toolchain.c_programs import FrontEndOnce, build  # noqa: E402
 
 SHAPES = tuple((level, alone) for level in ("-O0", "-O1", "-Os", "-O2") for alone in ("", "-fno-lto"))
 CYCLES = 3_000_000
+HOST_SECONDS = 600
+"""Limit of gcc and of the model on the host, which only a program that hangs reaches, also on a busy machine."""
 PORTS = ("PR1", "PR2", "PR3", "PR4", "PR5", "OC1RS", "OC1R", "OC2RS", "OC2R")
 SOURCES = ("one.c", "two.c", "three.c")
 NO_ROOM = re.compile(r"does not fit|no room for the stack|overflow")
@@ -50,8 +52,8 @@ def model(folder: Path) -> Seen | None:
         return None
     program = folder / "model"
     command = ["gcc", "-DHOST", "-O1", "-w", "-std=gnu11", *(str(folder / name) for name in SOURCES)]
-    subprocess.run([*command, "-o", str(program)], check=True, capture_output=True, timeout=60)
-    said = subprocess.run([str(program)], check=True, capture_output=True, text=True, timeout=20).stdout
+    subprocess.run([*command, "-o", str(program)], check=True, capture_output=True, timeout=HOST_SECONDS)
+    said = subprocess.run([str(program)], check=True, capture_output=True, text=True, timeout=HOST_SECONDS).stdout
     *trace, checksum = said.split()
     return Seen(checksum, tuple(trace))
 
