@@ -28,7 +28,7 @@ struct native {
     void *record, *env;
     u64 *begins, *limit, *last, *noted, *notes, *fresh, *cycle, *now, *deadline;
     uint32_t *pc;
-    uint16_t *mode, *corcon, *enables[3];
+    uint16_t *mode, *corcon;
     i64 room, interpret, service, awake, trap;
 };
 
@@ -156,7 +156,7 @@ static int pass_limit(struct robot *r)
     int awake = *n->mode == n->awake, is_probed = now >= r->probe_at, is_cut = r->senses && now >= quantum_end(r, tick);
     if (!*n->last || now < (i64)*n->last || !(is_probed || is_cut) || now >= r->end)
         return 0;
-    if (*n->corcon & n->trap || !(awake || *n->enables[0] || *n->enables[1] || *n->enables[2]))
+    if (*n->corcon & n->trap)
         return 0;
     for (; quantum_end(r, tick) <= now; tick++) {
         if ((i64)*n->noted == n->room)

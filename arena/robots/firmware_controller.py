@@ -58,7 +58,6 @@ REPORT_AFTER: Final = 64
 4096 steps."""
 STUCK_TCY: Final = FCY // 10
 """Time after which a trap handler counts as stuck."""
-_ENABLES: Final = ("IEC0", "IEC1", "IEC2")
 _TRAP_BIT: Final = 3
 """IPL3 of CORCON: the CPU is handling a trap (isa.md §14.4)."""
 FULL_VOLTS: Final = 4.2
@@ -143,7 +142,6 @@ class FirmwareController:
         the middle of a quantum, and there the progress of the other robots depends on what runs them."""
         self._greenlet: greenlet | None = None
         """The greenlet that executes `run_until`."""
-        self._enables: Final = tuple(self.machine.chip.sfrs[name].address >> 1 for name in _ENABLES)
         self._led_changes: list[LedChange] = []
         self._leds = 0
         for bit, pin in enumerate(LED_PINS.values()):
@@ -321,23 +319,19 @@ class FirmwareController:
         return self._poses
 
     def _detect_stuck(self) -> None:
-        """Report firmware that can no longer run: it stays in a trap handler, or sleeps with interrupts disabled."""
-        machine = self.machine
-        why = ""
-        if machine.state.corcon >> _TRAP_BIT & 1:
-            trap = machine.chip.vectors[machine.peek("INTTREG") & VECNUM].name
-            why = f"sits in the handler of {trap}"
-        elif machine.is_asleep and not any(machine.record.u16[word] for word in self._enables):
-            why = "sleeps with every interrupt off"
-        if not why:
-            self.native.stuck_since = -1
-        elif self.native.stuck_since < 0:
-            self.native.stuck_since = machine.cycle
-        elif not self._fault_text.startswith(why) and machine.cycle - self.native.stuck_since > STUCK_TCY:
+        """Report firmware that stays in a trap handler."""
+        machine, native = self.machine, self.native
+        if not machine.state.corcon >> _TRAP_BIT & 1:
+            native.stuck_since = -1
+            return
+        why = f"sits in the handler of {machine.chip.vectors[machine.peek('INTTREG') & VECNUM].name}"
+        if native.stuck_since < 0:
+            native.stuck_since = machine.cycle
+        elif not self._fault_text.startswith(why) and machine.cycle - native.stuck_since > STUCK_TCY:
             where = f" in {machine.image.symbols.text(machine.pc)}" if machine.image else ""
             fault = machine.stopped("halt").fault
             why += f": {fault.cause.rstrip(',')}" if fault is not None else ""
-            since = (self.native.stuck_since + self._on_at) / FCY
+            since = (native.stuck_since + self._on_at) / FCY
             self._fault_text = f"{why} since {since:.2f} s, at {machine.pc:#08x}{where}"
 
     def _detect_silence(self) -> None:

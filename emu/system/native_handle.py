@@ -32,7 +32,7 @@ class Native(Structure):
                       # refreshes, each as PC + (index of the register << 32)
             "cycle", "now", "deadline",  # uint64: cycle of the CPU, of the devices, of the earliest event
             "pc",  # uint32
-            "mode", "corcon", "ie0", "ie1", "ie2",  # uint16: mode of the CPU, and SFRs
+            "mode", "corcon",  # uint16: mode of the CPU, and an SFR
         )),
         *((name, c_int64) for name in (
             "room",  # capacity of `notes`

@@ -84,7 +84,7 @@ TRANSLATOR: Final = "emu.dspic30f.jit.translate.function"
 
 NATIVE_FIELDS: Final = {"cycle": "cpu.cycle", "now": "events.now", "deadline": "events.deadline", "pc": "cpu.pc",
                         "mode": "cpu.mode"}  # fmt: skip
-NATIVE_SFRS: Final = {"corcon": "CORCON", "ie0": "IEC0", "ie1": "IEC1", "ie2": "IEC2"}
+NATIVE_SFRS: Final = {"corcon": "CORCON"}
 """Record fields and registers by the names of the fields in `Native`."""
 
 Call = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_void_p, ctypes.c_void_p)

@@ -93,6 +93,13 @@ def test_a_kernel_that_stopped_itself_is_reported(tmp_path: Path) -> None:
     assert any("main.c:2" in line["text"] for row in trial.columns["log"] for line in row)
 
 
+def test_sleep_that_the_watchdog_ends_is_not_reported(assembled: Assembled, tmp_path: Path) -> None:
+    """Firmware that sleeps for seconds without an interrupt, until the watchdog wakes it, is not reported."""
+    image = assembled(f"{BEGIN}\n bset RCON, #5 ; SWDTEN, about 16 s\n1: pwrsav #0\n bra 1b\n")
+    status, trial = run(image, tmp_path)
+    assert (status, trial.about["faults"]) == (0, [])
+
+
 def test_a_silent_robot_is_reported_after_the_time_of_the_scene(assembled: Assembled, tmp_path: Path) -> None:
     """Firmware that moves no wheels, changes no LEDs and sends no byte is reported after the time in the scene."""
     image = assembled(f"{BEGIN}\n1: bra 1b\n")
