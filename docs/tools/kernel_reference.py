@@ -6,6 +6,7 @@ The contract is the comment above a call: callers, blocking, worst-case Tcy, sta
 
 from __future__ import annotations
 
+import html
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -114,6 +115,21 @@ def head_of(text: str) -> str:
     return next((one for one in comments if "SPDX" not in one), "")
 
 
+def prose(text: str) -> str:
+    """Return plain text in Markdown: sentences as paragraphs with their options as code, everything else as code.
+
+    A paragraph is sentences unless it is a usage, an example, a list, a table or a command.
+    """
+    return "\n".join(_paragraph(part) for part in re.split(r"\n\n+", text) if part)
+
+
+def _paragraph(part: str) -> str:
+    if re.match(r"usage:|examples?:|\w[\w ]*:$", part) or re.search(r"^ |\S  |^[$-] ", part, re.MULTILINE):
+        return f"```text\n{part}\n```\n"
+    words = re.sub("`([^`]+)`", r"<code>\1</code>", html.escape(" ".join(part.split())))
+    return "<p>" + re.sub(r"(?<![\w-])--[a-z][\w-]+", r"<code>\g<0></code>", words) + "</p>\n"
+
+
 INTRODUCTION: Final = """# Kernel calls
 
 Every call with its contract, from the headers in `firmware/openswarm/include`. Callers: M = main before
@@ -127,7 +143,7 @@ def page() -> str:
     parts = [INTRODUCTION]
     for header in sorted(FOLDER.glob("*.h")):
         text, last = header.read_text(encoding="utf-8"), ""
-        parts.append(f"## {header.name}\n\n```text\n{head_of(text)}\n```\n\n")
+        parts.append(f"## {header.name}\n\n{prose(head_of(text))}\n\n")
         for one in _items(text):
             if isinstance(one, str):
                 parts.append(one)

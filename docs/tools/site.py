@@ -46,6 +46,11 @@ WHOLE = re.compile(r"(?<![\w-])--?[A-Za-z]\w*|-+&gt;|&lt;-+")
 """What a browser would break after its hyphens: the first word of an option, an arrow."""
 POWER = re.compile(r"\d+(?:\.\d+)?e-\d+")
 """A number that a browser would break after its minus sign."""
+BLOCK = re.compile(r'<div class="([^"]*\bhighlight\b[^"]*)"(>.*?</div>)', re.DOTALL)
+LINE = 96
+"""Longest line that fits on a wide screen in the usual size of code."""
+MOST_COLUMNS = {False: 125, True: 145}
+"""Longest line of a code block that a smaller font keeps whole on a wide screen: of any, of a diagram or columns."""
 KEYS = Path("docs/scene-keys.md")
 
 
@@ -112,6 +117,19 @@ def with_breaks(text: str) -> str:
     return ARTICLE.sub(lambda article: _in_text(WHOLE, whole, article[0]), text)
 
 
+def with_sizes(text: str) -> str:
+    """Return the HTML of a page in which each code block names the length of its longest line, if a smaller font can
+    keep its lines whole."""
+    return BLOCK.sub(_sized, text)
+
+
+def _sized(block: re.Match[str]) -> str:
+    lines = html.unescape(re.sub("<[^>]+>", "", block[2].partition("<code>")[2])).splitlines()
+    most = MOST_COLUMNS["columns" in block[1] or "diagram" in block[1] or any("  #" in line for line in lines)]
+    longest = max((len(line) for line in lines if len(line) <= most), default=0)
+    return f'<div class="{block[1]}" style="--columns: {longest}"{block[2]}' if longest > LINE else block[0]
+
+
 def _in_code(pattern: re.Pattern[str], wanted: str, text: str) -> str:
     """Return HTML with a pattern replaced in the text of its code, not in tags."""
     return CODE.sub(lambda code: _in_text(pattern, wanted, code[0]), text)
@@ -161,7 +179,9 @@ def _block(text: str) -> str:
         usage, gap, rest = text.partition("\n\n")
         text = re.sub(r"\n {7,}", " ", usage) + gap + rest
     title = re.fullmatch(r"(\w[\w ]*):", text)
-    return f"**{title[1]}**\n" if title else f"```text\n{text}\n```\n" if text else ""
+    if title:
+        return f"**{title[1]}**\n"
+    return kernel_reference.prose(text)
 
 
 def help_of(program: str) -> str:
@@ -234,7 +254,7 @@ def main() -> int:
         surroundings = os.environ | {"NO_MKDOCS_2_WARNING": "1"}
         status = subprocess.run([sys.executable, *map(str, words)], cwd=ROOT, env=surroundings, check=False).returncode
     for page in wanted.out.rglob("*.html"):
-        page.write_text(with_breaks(page.read_text(encoding="utf-8")), encoding="utf-8")
+        page.write_text(with_sizes(with_breaks(page.read_text(encoding="utf-8"))), encoding="utf-8")
     # the page for wrong addresses names its style sheets from the server's root, where they may not be
     (wanted.out / "404.html").unlink(missing_ok=True)
     return status
