@@ -45,8 +45,8 @@ def read_key(path: Path) -> bytes:
         key = b""
     if len(key) != BYTES:
         raise ValueError(f"{path}: expected a key of {2 * BYTES} hexadecimal digits: {_ADVICE}")
-    if key == b"\xff" * BYTES:
-        raise ValueError(f"{path}: a key of erased flash is no secret: {_ADVICE}")
+    if len(set(key)) == 1:  # 0xFF: erased flash
+        raise ValueError(f"{path}: a key of equal bytes is no secret: {_ADVICE}")
     return key
 
 
