@@ -11,6 +11,11 @@ void note(char c)
     }
 }
 
+void note_letter(void *letter)
+{
+    note(*(const char *)letter);
+}
+
 void boot(void)
 {
     host_use_virtual_time();
@@ -52,4 +57,18 @@ void yield_for_ever(void)
     for (;;) {
         Sys_Yield();
     }
+}
+
+void sleep_for_ever(void *unused)
+{
+    (void)unused;
+    for (;;) {
+        Sys_Sleep(1000);
+    }
+}
+
+uint16 start_thread(void (*entry)(void *), const void *arg)
+{
+    sys_process_config config = {entry, (void *)arg, 0, 0, 0, 0, 0};
+    return Sys_Start_ProcessWith(&config);
 }

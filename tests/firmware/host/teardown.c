@@ -9,25 +9,6 @@ static sys_mutex mutex = SYS_MUTEX(0);
 static sys_cleanup of_thread[4];
 static uint16 pids[4];
 
-static uint16 start(void (*entry)(void *), const void *arg)
-{
-    sys_process_config config = {entry, (void *)arg, 0, 0, 0, 0, 0};
-    return Sys_Start_ProcessWith(&config);
-}
-
-static void sleep_for_ever(void *unused)
-{
-    (void)unused;
-    for (;;) {
-        Sys_Sleep(1000);
-    }
-}
-
-static void note_end(void *letter)
-{
-    note(*(const char *)letter);
-}
-
 static void kill(void *pid)
 {
     note(Sys_Kill_Process(*(const uint16 *)pid) ? 'k' : 'f');
@@ -54,7 +35,7 @@ static void cleanup_first(void *unused)
 static void end_in_order(void (*entry)(void *))
 {
     boot();
-    uint16 victim = start(entry, NULL);
+    uint16 victim = start_thread(entry, NULL);
     Sys_Sleep(5);
     CHECK(Sys_Kill_Process(victim));
     CHECK(strcmp(trace, "n") == 0);
@@ -83,9 +64,9 @@ TEST(threads_whose_cleanups_kill_each_other_end_once, "openswarm_cleanup.h: ends
     uint16 empty = heap_now();
     Sys_Subscribe_to_Event(SYS_EVENT_TERMINATION, 0, count_delivery, NULL);
     uint16 one_more = heap_now();
-    pids[0] = start(push_kill, &pids[1]);
-    pids[1] = start(push_kill, &pids[2]);
-    pids[2] = start(push_kill, &pids[0]);
+    pids[0] = start_thread(push_kill, &pids[1]);
+    pids[1] = start_thread(push_kill, &pids[2]);
+    pids[2] = start_thread(push_kill, &pids[0]);
     Sys_Sleep(40);
     CHECK(Sys_Kill_Process(pids[1]));
     CHECK(strcmp(trace, "kkf") == 0); /* the last cleanup finds pids[1] ended */
@@ -99,7 +80,7 @@ TEST(threads_whose_cleanups_kill_each_other_end_once, "openswarm_cleanup.h: ends
 
 static void kill_killer(void *unused)
 {
-    CHECK(Sys_Push_Cleanup(&of_thread[0], note_end, "l") && Sys_Push_Cleanup(&of_thread[1], kill, &pids[3]));
+    CHECK(Sys_Push_Cleanup(&of_thread[0], note_letter, "l") && Sys_Push_Cleanup(&of_thread[1], kill, &pids[3]));
     sleep_for_ever(unused);
 }
 
@@ -116,9 +97,9 @@ TEST(a_cleanup_in_a_handler_may_kill_the_interrupted_thread, "openswarm_cleanup.
     Sys_Register_Event(E1);
     Sys_Subscribe_to_Event(E1, 0, kill_in_handler, NULL);
     uint16 empty = heap_now();
-    pids[0] = start(kill_killer, NULL);
+    pids[0] = start_thread(kill_killer, NULL);
     Sys_Sleep(5);
-    pids[3] = start(sleep_for_ever, NULL);
+    pids[3] = start_thread(sleep_for_ever, NULL);
     Sys_Send_IntEvent(E1, 0);
     Sys_Sleep(20);
     CHECK(strcmp(trace, "kl") == 0);
@@ -132,7 +113,7 @@ TEST(a_cleanup_without_a_function_is_refused, "openswarm_cleanup.h: ARGUMENT")
     boot();
     CHECK(!Sys_Push_Cleanup(&of_thread[0], NULL, NULL));
     CHECK_EQ(Sys_Get_LastError(), SYS_ERROR_ARGUMENT);
-    CHECK(!Sys_Push_Cleanup(NULL, note_end, NULL));
+    CHECK(!Sys_Push_Cleanup(NULL, note_letter, NULL));
     CHECK_EQ(Sys_Get_LastError(), SYS_ERROR_ARGUMENT);
 }
 

@@ -1,6 +1,6 @@
 /* A kernel test is one function that runs as PID 0 of a fresh kernel. On a host each test has its own
  * process and virtual time: `./kernel_tests` lists the tests, `./kernel_tests NAME [SEED]` runs one and
- * exits with 0 if it passes. target/bugs runs the tests of original_bugs.c on the emulated robot, each after
+ * exits with 0 if it passes. target/bugs runs those of three files on the emulated robot, each after
  * a reset. */
 #ifndef TEST_H
 #define TEST_H
@@ -73,9 +73,12 @@ bool lists_are_well_formed(void); /* checks ring, blocked list and thread states
 extern int deliveries; /* calls of count_delivery */
 bool count_delivery(uint16 pid, uint16 id, sys_event_data *data);
 void yield_for_ever(void); /* a thread */
+void sleep_for_ever(void *unused);
+uint16 start_thread(void (*entry)(void *), const void *arg); /* with the default stack; returns its PID */
 
 /* Sequence of events of a test: threads and handlers append characters with note(). */
 extern char trace[];
 void note(char c);
+void note_letter(void *letter); /* a cleanup: appends *letter */
 
 #endif

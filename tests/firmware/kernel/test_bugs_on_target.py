@@ -1,4 +1,4 @@
-"""The named bugs of the original system on the emulated robot: tests of host/original_bugs.c, each after a reset."""
+"""Tests of the host on the emulated robot, each after a reset: named bugs of the original system, kills, misuse."""
 
 from __future__ import annotations
 
@@ -13,29 +13,38 @@ from tests.firmware.kernel.test_kernel_on_target import FCY, check_each_from, lo
 from tests.fuzz.seeds import base_seed
 
 HOST = Path(__file__).parents[1] / "host"
-# These need the host's unlock hook or UART sink; test_every_instruction.py and the processor tests cover them.
-HOST_ONLY = {"bug_13_events_from_threads_and_interrupts_mix_at_every_point", "bug_24b_each_uart_sends_its_own_bytes"}
-TESTS = [
-    name for name in re.findall(r"^TEST\((\w+),", (HOST / "original_bugs.c").read_text(), re.M) if name not in HOST_ONLY
-]
+# These need hooks of the host or its UART sink; test_every_instruction.py and the processor tests cover some of them.
+HOST_ONLY = {
+    "bug_13_events_from_threads_and_interrupts_mix_at_every_point",
+    "bug_24b_each_uart_sends_its_own_bytes",
+    "a_kill_at_every_unlock_of_any_call_loses_nothing",
+    "an_eager_kill_at_every_unlock_of_any_call_loses_nothing",
+    "a_failing_allocation_in_any_call_loses_nothing",
+    "a_kernel_without_threads_starts_threads_from_a_handler",
+}
+SOURCES = ("original_bugs", "kills", "misuse")
+"""Files of HOST without .c."""
 
 
 @pytest.mark.slow
-def test_the_kernel_on_the_robot(image: Build) -> None:
-    """Each test of host/original_bugs.c that can run on the chip passes on the emulated robot (openswarm-original.md
-    §7)."""
-    defines = f"DEFINES=-DTESTS={','.join(TESTS)} -DSYS_DEFAULT_STACK=192"
+@pytest.mark.parametrize("source", SOURCES)
+def test_the_kernel_on_the_robot(image: Build, source: str) -> None:
+    """Each test of the host's file that can run on the chip passes on the emulated robot (openswarm-original.md §7)."""
+    found = re.findall(r"^TEST\((\w+),", (HOST / f"{source}.c").read_text(), re.M)
+    tests = [name for name in found if name not in HOST_ONLY]
+    assert len(tests) > 5
+    defines = f"DEFINES=-DSOURCE={source} -DTESTS={','.join(tests)} -DSYS_DEFAULT_STACK=192"
     machine = load(image("bugs", TARGET_APPS, defines))
     said = bytearray()
     machine.uart[1].on_byte = lambda byte, _: said.append(byte)
 
     def check(name: str) -> None:
         said.clear()
-        machine.poke("chosen", TESTS.index(name))
+        machine.poke("chosen", tests.index(name))
         stop = machine.run(cycles=4 * FCY, until=place(machine, "passed"))
         assert stop.reason == "until", (stop, bytes(said))
 
-    check_each_from(machine, "begin", check, TESTS)
+    check_each_from(machine, "begin", check, tests)
 
 
 @pytest.mark.slow

@@ -1,7 +1,8 @@
-/* Runs one test of host/original_bugs.c on the robot: `chosen` is its index in TESTS (DEFINES of the Makefile). */
+/* Runs one test of host/SOURCE.c on the robot: `chosen` is its index in TESTS (DEFINES of the Makefile). */
 #include "../../host/test.h"
 
-#include "../../host/original_bugs.c"
+#define PATH_OF(name) HAL_TEXT(../../host/name.c)
+#include PATH_OF(SOURCE)
 #include "../../host/support.c"
 
 #include <p30F6014A.h>
