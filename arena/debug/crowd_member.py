@@ -38,7 +38,7 @@ class CrowdMember:
         """Light can wake the CPU at any time."""
         self.is_past = False
         self.end = 0
-        """Tick of 1/8 MHz at which the crowd waits for the world."""
+        """Tick (125 ns) at which the crowd waits for the world."""
         self.is_at_end = False
         """Whether all robots have reached this tick."""
         self._log: Final = bytearray()

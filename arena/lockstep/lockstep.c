@@ -83,7 +83,7 @@ struct native_world {
     const f64 *now, *before;
 };
 
-// A worker thread. It sleeps in a lock of the Python library, which it can acquire without the GIL.
+// A worker thread. Without work it blocks on `lock`, a lock of the Python runtime that needs no GIL.
 struct worker {
     void *lock;
     i64 is_asleep, runs; // runs: robots it has run so far

@@ -118,7 +118,7 @@ class KilobotCrowd:
             self.run_until(end)
 
     def run_until(self, end: int) -> None:
-        """Run all robots to a tick of 1/8 MHz; a robot whose firmware faults stops."""
+        """Run all robots to tick `end` (125 ns each); a robot whose firmware faults stops."""
         while True:
             try:
                 self.swarm.run_until(end)

@@ -29,4 +29,4 @@ class CrowdControl(Protocol):
     """Runs all Kilobots of a trial."""
 
     def run_crowd(self, end: int) -> None:
-        """Run all robots to a tick of 1/8 MHz. May suspend the calling greenlet, and with it the trial, at any time."""
+        """Run all robots to tick `end` (125 ns each). May suspend the greenlet, and with it the trial, at any time."""

@@ -106,7 +106,7 @@ def pipe() -> tuple[PipeEnd, PipeEnd]:
 
 
 def context() -> SpawnContext | ForkServerContext:
-    """Return the multiprocessing context for a process that can be forked: it starts without other threads."""
+    """Return the multiprocessing context for a process that forks checkpoints later: it starts with a single thread."""
     if not CAN_FORK:
         return multiprocessing.get_context("spawn")
     made = multiprocessing.get_context("forkserver")

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 class Processor(Protocol):
-    """Registers, call stacks and instructions of one machine. Addresses of code are even, with two per word."""
+    """Registers, call stacks and instructions of one machine. Code addresses are even: a program word spans two."""
 
     @property
     def register_names(self) -> tuple[str, ...]:
@@ -69,13 +69,13 @@ class Processor(Protocol):
         """Return text and words of the instruction at `pc`, None if there is none."""
 
     def has_left(self, stack: int, entry: int) -> bool:
-        """Whether the stack pointer shows that the function with a frame's `entry` has returned."""
+        """Whether the stack pointer shows that the function whose `RawFrame.entry` is `entry` has returned."""
 
     def stack_at_entry(self, entry: int) -> int:
-        """Return the stack pointer at the first instruction of the function with a frame's `entry`."""
+        """Return the stack pointer at the first instruction of the function whose `RawFrame.entry` is `entry`."""
 
     def stack_after_return(self, entry: int) -> int:
-        """Return the stack pointer after the return of the function with a frame's `entry`."""
+        """Return the stack pointer after the return of the function whose `RawFrame.entry` is `entry`."""
 
     def stack_in_handler(self, before: int) -> int:
         """Return the stack pointer at the first instruction of a handler, from the one before its entry."""
@@ -87,7 +87,7 @@ class Processor(Protocol):
         """Write bytes of data memory for the debugger's user. Raises ValueError for memory that cannot be written."""
 
     def register_groups(self) -> list[Mapping[str, Any]] | None:
-        """Return the peripherals with their registers; None if the chip's table lists them."""
+        """Return the registers grouped by peripheral; None if the caller must take them from the chip's table."""
 
 
 @runtime_checkable

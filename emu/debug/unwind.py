@@ -280,7 +280,11 @@ class RawFrame:
     """Address of the frame's next instruction; for a caller, the return address."""
     registers: tuple[int | None, ...]
     entry: int | None
-    """W15 at the function's first instruction. The return address lies in the four bytes below it."""
+    """Stack pointer that identifies the call.
+
+    dsPIC30F: W15 at the function's first instruction; the return address lies in the four bytes below it.
+    AVR: SP after the function's return.
+    """
     start: int | None
     """Address of the function's first instruction."""
     is_handler: bool = False

@@ -68,7 +68,7 @@ def _ranks(values: Sequence[int]) -> dict[str, int]:
 
 @dataclass(slots=True)
 class ApplicationCycles:
-    """Result of a run."""
+    """Cycles of each kernel operation in one run of an application."""
 
     seconds: float
     operations: dict[str, Operation]

@@ -35,7 +35,7 @@ EntryObserver = Callable[[Accepted, int, int], None]
 
 
 class ExecutionLog:
-    """Start cycle and address of the last instructions."""
+    """Start cycles and addresses of the last `LOGGED` instructions, or of up to twice as many."""
 
     def __init__(self) -> None:
         self._cycles: Final = array("q")

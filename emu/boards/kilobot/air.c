@@ -1,6 +1,6 @@
 // Infrared light between Kilobots: edges of emitters reach the receivers' comparators and converters.
 //
-// Time is counted in ticks of 1/8 MHz since the start of the swarm; each robot has its own clock rate. Light reaches
+// Time is counted in ticks of 125 ns since the start of the swarm; each robot has its own clock rate. Light reaches
 // other robots `delay` ticks after the emitter's pin, and the sender itself (its echo) after ECHO ticks. A robot never
 // runs past a tick at which light may still arrive. So no light is late, and the division of a run into calls has no
 // effect.

@@ -1,6 +1,6 @@
 """Infrared messages of kilolib as pulses of light, both ways (kilobot.md §2).
 
-Input: messages, or the times of a robot's pulses. Output: times of pulses, or messages. Times are ticks of 1/8 MHz.
+Input: messages, or the times of a robot's pulses. Output: times of pulses, or messages. Times are ticks of 125 ns.
 """
 
 from __future__ import annotations

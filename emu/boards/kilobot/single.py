@@ -48,7 +48,7 @@ class SingleKilobot:
         return changes
 
     def run_until(self, tick: int) -> None:
-        """Run to a tick of 1/8 MHz, or until the observed robot stops. Raises KilobotFaultError."""
+        """Run to `tick` (125 ns each), or until the observed robot stops. Raises KilobotFaultError."""
         swarm = self.swarm
         while swarm.now < tick:
             swarm.run_until(tick if self.next_command is None else min(tick, self.next_command))

@@ -143,7 +143,7 @@ class KilobotSwarm:
     """Kilobots at power-on.
 
     `loss`: share of the pulses, 0 to below 1, that a receiver misses. It may be a curve over the distance instead:
-    points (mm, share), linear between them and constant beyond. `delay`: ticks of 1/8 MHz after which light reaches
+    points (mm, share), linear between them and constant beyond. `delay`: ticks of 125 ns after which light reaches
     other robots, 18 or more. `reach`: range in mm between the centres of two robots. Raises ValueError.
     """
 
@@ -158,7 +158,7 @@ class KilobotSwarm:
         self.places = np.array([(robot.x, robot.y) for robot in robots], dtype=float).reshape(-1, 2)
         """Positions of the centres in mm; `move` and `move_all` change them."""
         self.now = 0
-        """Ticks of 1/8 MHz since the start."""
+        """Ticks of 125 ns since the start."""
         self._observed: tuple[int, Observation | None] = (0, None)
         self._functions = _code()
         programs: dict[bytes, Program] = {}
@@ -229,11 +229,11 @@ class KilobotSwarm:
         self._functions["air_flash"](addressof(self._air), robot, tick, PULSE_TICKS, *strengths)
 
     def tick_of(self, robot: int, cycle: int) -> int:
-        """Return the tick of 1/8 MHz of the swarm at a cycle of a robot's own clock."""
+        """Return the tick (125 ns) of the swarm's clock at a cycle of a robot's own clock."""
         return self._robots[robot].on_at + cycle * self._robots[robot].period // ONE_RATE
 
     def has_reached(self, robot: int, tick: int) -> bool:
-        """Return whether a robot has run to a tick of 1/8 MHz."""
+        """Return whether a robot has run to `tick` (125 ns each)."""
         return self._robots[robot].reached >= tick
 
     def pulses_sent(self, robot: int) -> int:
@@ -256,7 +256,7 @@ class KilobotSwarm:
         self.run_until(self.now + int(seconds * HZ))
 
     def run_until(self, tick: int) -> None:
-        """Run all robots to a tick of 1/8 MHz, or until the observed one stops; `now` is then its tick.
+        """Run all robots to `tick` (125 ns each), or until the observed one stops; `now` is then its tick.
 
         Raises KilobotFaultError; ValueError after too many calls of `light`.
         """

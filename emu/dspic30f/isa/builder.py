@@ -50,7 +50,7 @@ class Context:
 
 
 class Builder(Protocol):
-    """Operations that a row may use. README.md of this folder defines their order."""
+    """Operations of which a row of the instruction table builds its semantics. README.md defines their order."""
 
     context: Context
     pc: int  # program address of this instruction
@@ -86,7 +86,7 @@ class Builder(Protocol):
         """Return Wn as address pointer or pointer offset, 0..65535. An uninitialised register resets the device."""
 
     def set_ptr(self, n: int, v: Value, side: Side) -> None:
-        """Set the pointer Wn to the low 16 bits of ``v``. Only on side ``dst`` it may cause a RAW stall."""
+        """Set the pointer Wn to the low 16 bits of ``v``. Only side ``dst`` may cause a RAW stall."""
 
     def load(self, ea: Value, size: Size, side: Side = "src", ptr: int | None = None) -> Value:
         """Read 1 or 2 bytes of data space.

@@ -58,10 +58,10 @@ class Counting(Protocol):
         """Return a counter for one translated function."""
 
     def boundary_counter(self) -> BoundaryCounter:
-        """Return the counter of native boundaries."""
+        """Return the emitter of counting code for the instruction boundaries that native code handles."""
 
     def identity(self, region: Region) -> Any:
-        """Return what distinguishes the code of a region from that without counting."""
+        """Return all facts on which the counting code of a region depends, for the cache key of its translation."""
 
 
 class CycleCounting:
@@ -92,7 +92,7 @@ class CycleCounting:
         return AccountingCounter(self._accounting.words, self._accounting.tail, self._row_of)
 
     def boundary_counter(self) -> BoundaryCounter:
-        """Return the counter of native boundaries."""
+        """Return the emitter of counting code for the instruction boundaries that native code handles."""
         return AccountingBoundaryCounter(self._accounting.words, self._accounting.tail)
 
     def identity(self, region: Region) -> Any:
@@ -177,7 +177,7 @@ class ChangeCounting:
         return ChangeCounter(self._log, self._ram)
 
     def boundary_counter(self) -> BoundaryCounter:
-        """Return the counter of native boundaries."""
+        """Return the emitter of counting code for the instruction boundaries that native code handles."""
         return ChangeBoundaryCounter()
 
     def identity(self, region: Region) -> Any:

@@ -47,7 +47,7 @@ def power_operands(record: Record, chip: Chip, timeout: int, mode: Cell) -> Powe
 
 
 def any_bit(m: RuleBuilder, words: tuple[tuple[Cell, int], ...]) -> Number:
-    """Return a number that is not 0 if one of the bits is set."""
+    """Return a number that is not 0 if any bit of `words`, pairs of register and mask, is set."""
     found: Number = 0
     for place, bits in words:
         found = found | (m.get(place) & bits)

@@ -41,7 +41,7 @@ class QueuedFrame:
 
 @dataclass(frozen=True, slots=True)
 class RxQueueOperands:
-    """Operands of the rules: a ring of `CAPACITY` frames, and whether the backlog has more."""
+    """Operands of the rules: a ring of `CAPACITY` frames; `more` is 1 if the backlog holds further frames."""
 
     earliest: Cell
     bit: Cell
