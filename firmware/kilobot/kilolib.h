@@ -47,7 +47,7 @@ void spinup_motors(void);
 void set_color(uint8_t rgb);
 
 void delay(uint16_t ms);
-uint8_t rand_soft(void); /* shift register */
+uint8_t rand_soft(void); /* pseudo-random, from a shift register */
 void rand_seed(uint8_t seed);
 uint8_t rand_hard(void);         /* from the noise of the battery's voltage; takes some ms */
 int16_t get_ambientlight(void);  /* counts, or -1 while a message is received */

@@ -1,5 +1,5 @@
 /* Clocks that agree by gossip (README.md): the swarm's time is that of the robot that has been on for longest. A message
- * contains the time of its sending, so a receiver knows it at the end of the message, less the transmission time. */
+ * contains the swarm's time when it was sent; the receiver adds the duration of the transmission, AIR_MS. */
 #include "rove.h"
 
 #include <openswarm.h>

@@ -10,8 +10,8 @@
 
 enum {
     PERIOD_MS = 450,    /* between the leader's counts, up to a quarter more or less */
-    RELAY_MS = 350,     /* longest delay before a follower forwards a count, */
-    ENOUGH = 2,         /* unless it has received this count so often by then */
+    RELAY_MS = 350,     /* longest delay before a follower forwards a count */
+    ENOUGH = 2,         /* a follower that has received this many copies of a count does not forward it */
     FIRST_MS = 1000,    /* longest delay of a robot's first claim, which it omits if it receives a higher one before */
     ANSWER_MS = 150,    /* longest delay before a leader answers a robot that follows a lower rank */
     PATIENCE_MS = 5000, /* without a new count, about eleven periods: the leader has failed or is out of reach */

@@ -2,8 +2,8 @@
 /* What a CPU port provides: contract here, code in port/<cpu>/. hal_port.h of the port defines the types, and those
  * functions of this list that are worth inlining. docs/porting.md walks through the list.
  *
- * Three levels of exclusion. The slice interrupt and everything that runs on the kernel stack outside ISRs is level
- * "slice"; ISRs that use the kernel are level "device". Code of a level cannot be interrupted by its own level.
+ * Three levels of exclusion: thread, slice, device. The slice interrupt and all code on the kernel stack outside ISRs
+ * run at level slice, ISRs that use the kernel at level device. Code of these two is not interrupted by its own level.
  *
  * Atomic accesses, which no interrupt can divide: the load or the store of one byte is atomic on every CPU, that of a
  * word (a pointer, or 16 bits) only on some. HAL_LOAD and HAL_STORE below therefore access the words that ISRs share
@@ -119,8 +119,8 @@ static inline void hal_stack_release(const sys_pcb *process)
 }
 #endif
 /* Save the calling thread, run os_yield() or os_schedule() on the kernel stack at level slice and resume the thread
- * it returns. Both come back when the caller is resumed, at thread level. The slice interrupt does so with
- * os_slice_end(). */
+ * it returns. Both return when the caller is resumed, at thread level. The slice interrupt does the same
+ * with os_slice_end(). */
 void hal_yield(void); /* called at thread level */
 void hal_block(void); /* called at level slice */
 /* Discards the caller's context and resumes the thread that pick() returns. Called at level slice. */

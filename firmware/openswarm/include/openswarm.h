@@ -75,7 +75,7 @@ enum {
     SYS_1ms_TIMER = 0x07,           /* [uint16, low word of the system time] */
     SYS_IO_SELECTOR = 0x08,         /* [uint8 0-15] on change */
     SYS_UART1_RECEIVED = 0x09,      /* [bytes] one chunk or frame */
-    SYS_UART1_READY = 0x0A,         /* [uint16 SYS_UART_TX: free bytes] queue empty, after a call failed with BUSY */
+    SYS_UART1_READY = 0x0A,         /* [uint16 free bytes: SYS_UART_TX] queue empty after a call refused as BUSY */
     SYS_SEND_UART2 = 0x0B,
     SYS_UART2_RECEIVED = 0x0C,
     SYS_UART2_READY = 0x0D,
@@ -114,7 +114,7 @@ typedef struct {
     uint16 deadline_ms;    /* relative to each release; 1..period_ms */
 } sys_process_config;
 
-/* MTH | no | 520 + 20 n, of which 2 per byte paint the stack; at most 900 more while memory is short, and
+/* MTH | no | 520 + 20 n, and 2 per byte beyond SYS_DEFAULT_STACK; at most 900 more while memory is short, and
  * 800 in a handler | 34 | MEMORY.  PID, or 0 = failed (PID 0 is the system thread). */
 uint16 Sys_Start_Process(sys_function f);
 /* MTH | no | as above | 34 | MEMORY, ARGUMENT.  The same with a configuration. */
@@ -127,8 +127,8 @@ bool Sys_Kill_Process(uint16 pid);
 void Sys_Yield(void);
 /* T | yes, ms rounded up to the next 1 ms tick | 231 + 46 w + (88 + 7 w) e | 36 | CONTEXT.  0 ms = Sys_Yield. */
 void Sys_Sleep(uint16 ms);
-/* T with SYS_PERIODIC | until its next release | 267 + 46 w + (88 + 7 w) e; after a missed deadline 56 and those of
- * Sys_Send_IntEvent more | 60 | CONTEXT, PROCESS.  True: the deadline was met. */
+/* T with SYS_PERIODIC | until its next release | 267 + 46 w + (88 + 7 w) e; after a missed deadline another 56 and
+ * those of Sys_Send_IntEvent | 60 | CONTEXT, PROCESS.  True: the deadline was met. */
 bool Sys_Wait_for_Period(void);
 /* MTHI | no | 18, the end 15 | 4 | none.  Nests. Until the matching End, no thread switch occurs and no handler runs;
  * the End takes a slice end that is due. Interrupts stay enabled. An open section ends with its thread, or with the

@@ -41,7 +41,7 @@ enum {
 #define SYS_INFRARED_QUEUE 4 /* frames waiting to be sent; 1 to 128 */
 #endif
 #define SYS_NEIGHBOUR_LIFETIME 7000 /* ms without a frame after which a neighbour is lost */
-#define SYS_BEACON_PERIOD 2048      /* ms, up to a quarter more: a robot silent for so long sends an empty frame */
+#define SYS_BEACON_PERIOD 2048      /* ms, up to a quarter more: a robot silent for this long sends an empty frame */
 
 typedef struct {
     uint16 source;   /* the sender's number, 1 to 2047; also data->value */

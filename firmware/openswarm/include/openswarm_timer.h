@@ -20,8 +20,8 @@ typedef struct sys_timer {
     uint16 due, period;
 } sys_timer;
 
-/* MTH | no | 165; 180 beside two others | 42 | ARGUMENT: first_ms not 1..32767, or period_ms not 0..32767.  Sends the
- * event with the value after first_ms and then every period_ms; period 0 = once. Starts a running timer again. */
+/* MTH | no | 165; 180 with two running | 42 | ARGUMENT: first_ms not 1..32767, or period_ms not 0..32767.  Sends the
+ * event with the value after first_ms and then every period_ms; period 0 = once. Restarts a running timer. */
 bool Sys_Start_Timer(sys_timer *timer, uint16 event, uint16 value, uint16 first_ms, uint16 period_ms);
 /* MTH | no | 89, 10 more per newer timer | 24 | PROCESS: it does not run.  The event of a timer that was due may still
  * wait in the queue. */

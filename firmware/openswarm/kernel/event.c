@@ -463,7 +463,7 @@ sys_event_data *Sys_Wait_for_ConditionTimeout(uint16 id, sys_condition condition
     }
     self->wait.condition = condition;
     process_block(e, ms);
-    return (sys_event_data *)self->wait.result; /* data is a union member, at offset 0; or NULL */
+    return (sys_event_data *)self->wait.result; /* NULL, or the message, whose event data is at offset 0 */
 }
 
 sys_event_data *Sys_Wait_for_Condition(uint16 id, sys_condition condition)

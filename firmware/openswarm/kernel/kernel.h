@@ -211,7 +211,7 @@ HAL_USED sys_pcb *os_schedule(void);              /* the running thread is no lo
 void os_preempt(void); /* requests a decision of an eager scheduler as soon as the level allows; any context */
 
 /* clock.c */
-uint16 clock_set_alarm_in(uint16 ms); /* returns the low word of that moment; slice locked */
+uint16 clock_set_alarm_in(uint16 ms); /* returns the low word of the alarm's time; slice locked */
 void clock_set_alarm(uint16 moment);  /* if it is earlier than the alarm in force */
 void clock_set_wake(sys_pcb *process, uint16 ms); /* starts the time-out of a blocked process; slice locked */
 void clock_wake_due(void);

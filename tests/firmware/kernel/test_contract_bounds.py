@@ -61,7 +61,8 @@ FREE = 1200
 """Maximum Tcy to free a block of memory (g of openswarm.h)."""
 MEASURED = {
     "Sys_Start_Process": (
-        "520 + 20 n, of which 2 per byte paint the stack; at most 900 more while memory is short, and 800 in a handler",
+        "520 + 20 n, and 2 per byte beyond SYS_DEFAULT_STACK; at most 900 more while memory is short, and 800 in a "
+        "handler",
         lambda n, k, **_: 520 + 20 * n + 2 * (k - 128) + 900 + 800,
     ),
     "Sys_Kill_Process": (

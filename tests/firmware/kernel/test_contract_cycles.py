@@ -105,7 +105,7 @@ MEASURED = {
         (Sizes(), Sizes(newer=4), Sizes(held=1, ready=3)), CROWDS,
     ),
     "Sys_Wait_for_Period": Measured(
-        "267 + 46 w + (88 + 7 w) e; after a missed deadline 56 and those of Sys_Send_IntEvent more",
+        "267 + 46 w + (88 + 7 w) e; after a missed deadline another 56 and those of Sys_Send_IntEvent",
         _period, (Sizes(), Sizes(ready=3)), (*CROWDS, Sizes(late=1), Sizes(late=1, resting=2), Sizes(late=1, due=2)),
     ),
     "Sys_Clear_EventData": Measured(

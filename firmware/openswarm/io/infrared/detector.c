@@ -9,9 +9,9 @@
 enum {
     COUNT = 16,
     SPREAD_FINE = 4, /* the spread is in 1/64 of a count */
-    SPREADS = 4,     /* the spread is 1.15 sigma, 75 % of a normal distribution: the threshold is 4.6 sigma */
+    SPREADS = 4,     /* per threshold, which is 4.6 sigma: a spread (75 % of a normal distribution) is 1.15 sigma */
     SPREAD_MOST = 15 * COUNT * SPREAD_FINE,
-    RISING = 3, /* increase of the spread per update; it decreases by 1: balanced if one level in four is above it */
+    RISING = 3, /* a level outside the spread adds this, one inside subtracts 1: in balance one in four is outside */
     STEP = 4,   /* change of the background per update: 32 counts a second */
     FIRST_THRESHOLD = 4
 };
@@ -21,7 +21,7 @@ static struct {
     uint16 limit; /* the sensor is lit if its level is below */
 } filters[HAL_INFRARED_SENSORS];
 static uint16 background[HAL_INFRARED_SENSORS];
-static uint16 spread[HAL_INFRARED_SENSORS]; /* deviation: three levels in four are nearer to the background */
+static uint16 spread[HAL_INFRARED_SENSORS]; /* distance from the background that three levels in four do not exceed */
 static uint16 least = COUNT * FIRST_THRESHOLD; /* minimum threshold */
 static uint8 followed; /* sensor updated last */
 

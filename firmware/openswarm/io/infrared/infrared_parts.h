@@ -63,7 +63,7 @@ typedef struct {
 } waiting_frame;
 
 bool queue_frame(frame_kind kind, const uint8 *payload, uint8 size); /* any context */
-extern waiting_frame queue[SYS_INFRARED_QUEUE]; /* read by the link: is the first frame filled? */
+extern waiting_frame queue[SYS_INFRARED_QUEUE]; /* the link reads is_filled of the first frame */
 extern volatile uint8 queue_first, queue_length;
 void queue_pack(frame_buffer *b);      /* takes the first frame */
 void queue_sent(void);                 /* the last bit of a frame is sent */
@@ -77,7 +77,7 @@ uint16 link_random(void);
 /* ---- infrared.c ---- */
 extern uint16 infrared_number;
 void infrared_received(const frame_buffer *b, uint8 sensor, uint16 strength);
-void infrared_leaving(uint8 *payload, uint8 size); /* a message before its first bit */
+void infrared_leaving(uint8 *payload, uint8 size); /* ISR: the program may change a message before it is sent */
 void infrared_housekeeping(void);      /* 64 times per second */
 typedef void (*frame_sink)(const frame *f);
 extern frame_sink infrared_event_sink; /* takes frames of kind FRAME_EVENT; NULL unless remote_events.c is used */

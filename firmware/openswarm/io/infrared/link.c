@@ -19,8 +19,8 @@ enum {
     LEAST_ONES = 10, /* minimum scans of light of a preamble: a proximity flash has 3 or 4 */
     LEAST_BEHIND_FLASH = 5,
     FLASH_COUNTS = 24, /* scans after an own flash, which may have hidden the first ones of a preamble */
-    LONGEST_ONES = 20, /* maximum scans of a preamble, somewhat less than 7 bits; more are ones inside a frame */
-    MOST_ONES = 36,    /* more scans of light are no frame */
+    LONGEST_ONES = 20, /* maximum scans of light in a preamble (18 sent); a longer light is ones inside a frame */
+    MOST_ONES = 36,    /* longer light is no frame and becomes the background */
     CLEAR = 12,        /* dark scans before sending: more than usual words have in a row */
     SLOT = 6,          /* scans of a back-off slot: the detection delay of faint light */
     FIRST_SLOTS = 12,

@@ -11,7 +11,7 @@ enum { SYS_SPI_TIMEOUT_MS = 100 /* of one transfer; no board's heap holds a tran
  * bytes are not sent, or those received are damaged; the transfer fails. Context: the thread that calls
  * Sys_SPI_Transfer. */
 typedef bool (*sys_spi_processor)(uint8 *bytes, uint16 size, bool received);
-/* MTH | no | 52 | 16 | none.  For later transfers; NULL: none. */
+/* MTH | no | 52 | 16 | none.  Sets the processor of later transfers; NULL removes it. */
 sys_spi_processor Sys_Set_SPIProcessor(sys_spi_processor processor);
 
 /* M | no | - | 20 | none.  Between Sys_Init_Kernel and Sys_Start_Kernel. Mode 0, 8 bits; rate and pins:

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /* Spreading of programs from robot to robot in messages of eight bytes, over any transport (infra-red:
  * openswarm_infrared.h). A robot with a program advertises it, rarely if all agree (Trickle, RFC 6206). A robot that
- * lacks it requests a row and, by one bit each, the row's parts. A robot with the row sends the parts to all in
- * sight. docs/design/update.md has the messages.
+ * lacks it requests the missing parts of one row; the request has one bit per part. A robot with the row sends these
+ * parts to all robots in sight. docs/design/update.md has the messages.
  *
  *     Sys_Start_Spreading(number);                  after Sys_Start_Update; number: random seed, differs between robots
  *     Sys_Spread(now, message)                      every SYS_SPREAD_TICK ms; true: send these eight bytes
@@ -34,7 +34,7 @@ void Sys_Hear_Update(uint32 now, const uint8 *message);
 bool Sys_Offer_Activation(uint16 version);
 /* Version of the newest whole program of this robot, or 0, and whether it is activated. */
 uint16 Sys_Get_StoredVersion(bool *is_active);
-/* Tx-processor: sends messages of this kind as frames (Sys_Frame_Tx) after a 0, and all others, such as text,
+/* Tx-processor: sends a message of Sys_Spread as a byte 0 and a frame (Sys_Frame_Tx), and all others, such as text,
  * unchanged. */
 bool Sys_Spread_Tx(const uint8 *message, uint16 size, sys_put put);
 

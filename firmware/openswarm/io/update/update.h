@@ -40,9 +40,9 @@ typedef struct {
  * complement. */
 uint32 Sys_Add_UpdateCrc(uint32 crc, const uint8 *bytes, uint8 count);
 
-/* Makes room for a program. false, and an update in progress continues: the facts are invalid, a complete program of
- * this version or a newer one is stored, the running or the kept program is not confirmed yet, or the store is worn.
- * false, and an update in progress is abandoned: the store cannot be erased. */
+/* Begins an update: erases a store. false, and an update in progress continues: the facts are invalid, a complete
+ * program of this version or a newer one is stored, the running or the kept program is not confirmed yet, or the store
+ * is worn. false, and an update in progress is abandoned: the store cannot be erased. */
 bool Sys_Begin_Update(const sys_update *facts);
 /* Stores a row, in any order; a row stored before stays. false: no such row, or flash does not hold it after three
  * writes; the update is then abandoned and the store not used until the next start. */

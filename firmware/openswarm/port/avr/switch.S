@@ -101,7 +101,7 @@ saved:  lds     r24, os_running
         movw    r26, r24
         st      X+, r28
         st      X+, r29
-        ld      r20, X+                 ; limit: below it now, or was something written there before?
+        ld      r20, X+                 ; overflow: SP is below the limit, or the byte there was overwritten
         ld      r21, X
         cp      r28, r20
         cpc     r29, r21

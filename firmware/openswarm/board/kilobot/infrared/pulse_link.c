@@ -17,8 +17,8 @@ enum {
     HALF_SLOT = 17, /* counts */
     FIRST_SLOT = 3, /* of the first bit: leaves 807 cycles for other interrupts */
     STOP_SLOT = FIRST_SLOT + 8,
-    LONGEST = 505, /* counts from a byte's first pulse to its last, four slots late because of another interrupt */
-    WINDOW = 370,  /* counts from the first pulse of byte 0 to its last, which is in STOP_SLOT */
+    LONGEST = 505, /* counts, maximum from a byte's first pulse to its last: an interrupt may delay it by four slots */
+    WINDOW = 370,  /* counts between the two pulses of a byte 0; the second is in STOP_SLOT */
     PAUSE = 100,   /* counts between bytes: time for all other code on this CPU */
     ECHO = 8,    /* counts behind the own light in which a pulse may be its reflection: UNVERIFIED, docs/accuracy.md */
     TICK = 977,  /* counts */
