@@ -54,7 +54,7 @@ def test_make_builds_and_its_test_finds_what_is_wrong(project):
     right = source.read_text()
     source.write_text(right.replace("Sys_Sleep(1000)", "Sys_Sleep(900)", 1))
     assert run_command(project, "make").returncode == 0
-    # settings of a folder around the project, such as a checkout of OpenSwarm, are not those of its tests
+    # settings of an enclosing folder, such as a checkout of OpenSwarm, must not affect the project's tests
     (project.parent / "pyproject.toml").write_text('[tool.pytest.ini_options]\naddopts = "--of-another-project"\n')
     done = run_command(project, "python", "-m", "pytest", "-q", "-k", "greets")
     assert (done.returncode, "1 failed" in done.stdout) == (1, True), done.stdout

@@ -14,7 +14,7 @@
  *
  * LOOP_BOUND: before a loop, or before the `while` that ends one. The loop has at most `rounds` iterations per entry.  The
  * annotation applies to the innermost loop of the machine code with an instruction of that line.
- * SAME_LOOP: before a line of an inner loop of the machine code that is the same loop of the source as the enclosing one.
+ * SAME_LOOP: before a line of an inner loop of the machine code that comes from the same source loop as the outer loop.
  * ONE_LOOP: a loop of the machine code with several back edges is one loop of the source.  Without it such a loop has no
  * bound, because it may be two loops of the source. */
 #define LOOP_BOUND(rounds) _BOUNDS_NOTE("loop", rounds)

@@ -1,4 +1,4 @@
-"""Headers of the external interrupts and change notification, of the causes of a reset, and of the watchdog timer."""
+"""Headers for external interrupts and change notification, for the causes of a reset, and for the watchdog timer."""
 
 from __future__ import annotations
 

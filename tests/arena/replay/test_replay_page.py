@@ -245,7 +245,7 @@ setTimeout(() => {
 
 @needs_browser
 def test_a_studio_page_tries_again_after_a_lost_connection(trial: Path, tmp_path: Path) -> None:
-    """A failed request shows when the next attempt follows; after a successful answer the page continues."""
+    """After a failed request the page shows the delay of its next attempt; after a successful one it continues."""
     record = read_trial(trial)
     robots = [[float(record.columns[f"r{i}_{key}"][0]) for key in ("x", "y", "heading")] for i in range(2)]
     now = {"state": "paused", "tick": 3, "t": 0.0, "epoch": 0, "hit": "", "breakpoints": [], "debugger": None,

@@ -56,7 +56,7 @@ def shared_families(random: Random) -> list[str]:
 
 
 class Generator:
-    """Draws one program."""
+    """Generator of one random program."""
 
     def __init__(self, random: Random, families: list[str] | None = None, later: float = 0.3) -> None:
         """families: of FAMILIES, by default a few random ones. later: share of programs with an interrupt in a call."""

@@ -20,8 +20,8 @@ extern const uint16 interpreter_sizes[SIZES]; /* Sizes of state.py */
 
 /* What the program observed: one record per call, and one per entry of a script. */
 typedef struct {
-    uint8 script, kind; /* of the running script */
-    uint8 index, code;  /* of the operation; ENTRY, 0xFE at the end of a script */
+    uint8 script, kind; /* number and context of the running script */
+    uint8 index, code;  /* of the operation; code is ENTRY (0xFF) when a script begins, END (0xFE) when it ends */
     uint16 pid, result, error, heap, time, extra;
 } record;
 

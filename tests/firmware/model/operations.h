@@ -57,6 +57,6 @@
     X(TICK)              /* the 1 ms clock ticks */                                       \
     X(SLICE)             /* the slice ends */                                             \
     X(INTERRUPT)         /* script of an ISR */                                           \
-    X(LATER)             /* n: the last ISR comes at the n-th unlock from here; once in a program */ \
+    X(LATER)             /* n: the last script runs as ISR at the n-th unlock from here; once */     \
     X(SYSTEM_TIME)                                                                        \
     X(FAIL)              /* allocations that succeed first, then how many fail */

@@ -4,7 +4,7 @@
 ; the rounds, broken becomes the number of the thread whose registers changed.
 
 
-; W1..W14 = seed + n * 0x101; W0 works. RCOUNT is compared through a REPEAT that must run to its end.
+; fill sets Wn to seed + n * 0x101, n = 1 to 14; W0 is scratch. RCOUNT is checked by a REPEAT that must run to its end.
         .macro  fill seed
         mov     #\seed+0x0101, w1
         mov     #\seed+0x0202, w2
