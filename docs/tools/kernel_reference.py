@@ -125,7 +125,8 @@ def prose(text: str) -> str:
 
 def _paragraph(part: str) -> str:
     if re.match(r"usage:|examples?:|\w[\w ]*:$", part) or re.search(r"^ |\S  |^[$-] ", part, re.MULTILINE):
-        return f"```text\n{part}\n```\n"
+        columns = len(re.findall(r"\S {2,}\S", part)) > 1
+        return f"```{'{ .text .columns }' if columns else 'text'}\n{part}\n```\n"
     words = re.sub("`([^`]+)`", r"<code>\1</code>", html.escape(" ".join(part.split())))
     return "<p>" + re.sub(r"(?<![\w-])--[a-z][\w-]+", r"<code>\g<0></code>", words) + "</p>\n"
 
