@@ -30,7 +30,8 @@ FRAMES_PER_S: Final = 12.5
 LIMIT: Final = 20_000
 """Maximum number of frames of a video; more are probably a mistake in --speed."""
 MAX_NUMBERED: Final = 50
-"""Maximum number of robots whose numbers a frame shows; the numbers of more robots would overlap."""
+"""Maximum number of robots whose numbers and camera strips a frame shows: of more, numbers would overlap, and the frame
+would be too high."""
 _LINE: Final = 14
 _PIXEL: Final = 6
 _INK, _PAPER, _PALE = palette.rgb(palette.INK), palette.rgb(palette.PAPER), (221, 221, 221)
@@ -154,7 +155,7 @@ def _frame(scene: Scene, data: dict[str, Any], sample: int, caption: str, least_
     picture = arena_picture(scene, robots, seen, data["objects"][sample], data["clusters"][sample],
                             [one["leds"][sample] for one in data["robots"]])  # fmt: skip
     cameras = sum(scene.robot_kind(number).has_camera for number in range(len(robots)))
-    (width, height), rows = picture.size, len(robots) if cameras else 0
+    (width, height), rows = picture.size, len(robots) if cameras and len(robots) <= MAX_NUMBERED else 0
     width, below = max(width, least_width), height + _LINE * (caption.count("\n") + 1) + 2
     total = below + _LINE * rows + 2
     image = Image.new("RGB", (width + width % 2, total + total % 2), _PAPER)

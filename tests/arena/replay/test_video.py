@@ -147,6 +147,17 @@ def test_a_full_disk_is_reported_and_leaves_no_half_film(
     assert list(tmp_path.iterdir()) == []
 
 
+def test_frames_of_many_robots_have_no_camera_strips(tmp_path: Path) -> None:
+    """A frame of up to 50 robots has a line for each; a frame of more robots is not higher than that of none."""
+    heights = {}
+    for robots in (1, 50, 51):
+        out = tmp_path / str(robots)
+        words = ["clustering", "--brain", "scripted", "--robots", str(robots), "--objects", "0"]
+        assert main(["run", *words, "--trials", "1", "--minutes", "0.01", "--out", str(out)]) == 0
+        heights[robots] = next(frames(read_trial(out / "trial-0001.parquet"), [0.0])).height
+    assert heights[50] - heights[1] == 49 * (heights[1] - heights[51])
+
+
 def test_a_film_shows_the_leds_of_kilobots(tmp_path: Path) -> None:
     """Kilobots are drawn with their radius, in the colour of the LED, and without camera strips."""
     needs("avr-gcc")
