@@ -52,8 +52,8 @@ def test_a_host_conforms(target: str, words: tuple[str, ...], checks: int, tmp_p
     run_make(FIRMWARE, f"TARGET={target}", "APPS=../tests/firmware/target", "APP=conformance", f"OUT={tmp_path}",
              f"HOST_FLAGS={flags}", *words)  # fmt: skip
     done = subprocess.run([tmp_path / "firmware"], capture_output=True, timeout=HANG, check=False)
+    assert done.returncode == 0, (done.returncode, done.stdout[-200:], done.stderr.decode(errors="replace"))
     check_conforms(done.stdout, checks)
-    assert done.returncode == 0
 
 
 NEARLY_ROUND = (("now_ms", 0xFE00), ("newest_pid", 0xFF00))
