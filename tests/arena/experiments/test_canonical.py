@@ -76,3 +76,56 @@ def test_a_swarm_transports_the_box(tmp_path: Path) -> None:
     assert trial.series.last("distance") == 0
     assert trial.times[-1] < 890
     assert len({robot for robot in range(20) if (np.array(trial.columns[f"r{robot}_seen"]) == 2).any()}) > 5
+
+
+ONE_ROBOT = """
+name = "one"
+experiment = "transport"
+
+[arena]
+width_cm = 200.0
+height_cm = 100.0
+
+[chassis]
+colour = "white"
+
+[[robots]]
+name = "robot"
+image = "transport"
+place = "poses"
+poses = [[{}, 50, {}]]
+
+[[objects]]
+radius_cm = 15
+height_cm = 20
+place = "poses"
+poses = [[90, 50]]
+mass_kg = 0.1
+colour = "red"
+
+[[obstacles]]
+name = "goal"
+x_cm = 180
+y_cm = 50
+radius_cm = 10
+height_cm = 40
+colour = "green"
+
+[camera]
+range_cm = "inf"
+pitch_deg = 8.0
+"""
+BODY_LED, FRONT_LED = 512, 256
+"""Bits of `Reading.leds`: the application lights the body LED while it pushes, the front LED while it moves on."""
+
+
+@pytest.mark.parametrize(("x", "heading", "led"), [(60, 0, BODY_LED), (120, 180, FRONT_LED)])
+def test_firmware_pushes_only_where_the_object_hides_the_goal(tmp_path: Path, x: int, heading: int, led: int) -> None:
+    """Behind the object a robot pushes it towards the goal; between object and goal it moves on and does not push."""
+    scene = tmp_path / "one.toml"
+    scene.write_text(ONE_ROBOT.format(x, heading), "utf-8")
+    options = ["--trials", "1", "--jobs", "1", "--minutes", "0.13", "--out", str(tmp_path / "out")]
+    assert main(["run", str(scene), *options]) == 0
+    trial = read_trial(tmp_path / "out/trial-0001.parquet")
+    assert set(trial.columns["r0_leds"]) == {0, led}
+    assert (trial.objects[-1, 0, 0] > 91) == (led == BODY_LED)

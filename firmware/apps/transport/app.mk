@@ -1,0 +1,1 @@
+DEVICES := analog camera i2c
