@@ -84,6 +84,21 @@ def test_every_kernel_call_has_an_anchor(site: Path) -> None:
 
 
 @pytest.mark.slow
+def test_the_search_finds_calls_of_kernel_and_python(site: Path) -> None:
+    """Every anchor of a kernel call, and of a public class, method, function and value of Python, is an entry."""
+    entries = json.loads((site / "search/search_index.json").read_text(encoding="utf-8"))["docs"]
+    found = {entry["location"] for entry in entries}
+    for page, pattern, least in (
+        ("reference/kernel-calls.html", r'<h4 id="(Sys_\w+)"', 90),
+        ("reference/python.html", r'<h[3-6] id="((?:emu|arena|openswarm)\.[\w.]+)"', 200),
+    ):
+        anchors = re.findall(pattern, (site / page).read_text(encoding="utf-8"))
+        assert len(anchors) > least, page
+        assert [name for name in anchors if f"{page}#{name}" not in found] == []
+    assert "reference/python.html#emu.machine.machine.Machine.run" in found
+
+
+@pytest.mark.slow
 def test_the_search_finds_options_and_keys_at_their_own_anchors(site: Path) -> None:
     """Every `--option` of a command's usage and every key of a scene is an entry of the search, with an anchor."""
     entries = json.loads((site / "search/search_index.json").read_text(encoding="utf-8"))["docs"]
