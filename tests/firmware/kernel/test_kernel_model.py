@@ -201,6 +201,7 @@ def test_programs_agree_on_the_kilobot(tmp_path: Path) -> None:
     for text in (SPEEDS_OUT_OF_RANGE, WITHDRAWN_REQUEST):
         check_on(machine, Program.parse(text))
     assert machine.compared == 2
+    check_on(machine, Program.parse(NO_ROOM_FOR_A_THREAD))
     check_on(machine, Program.parse(FRAGMENTED_HEAP))
     assert machine.compared == 2
     assert machine.lost > 0
@@ -225,6 +226,13 @@ thread 2: SUBSCRIBE(3, 1, 18)
 handler 2: KILL(0, 0, 0); TICK(0, 0, 0); SEND_INT(5, 0, 0)
 handler 3: TICK(0, 0, 0); READ(0, 0, 0)"""
 """A message of the clock is lost on the Kilobot alone, which sets no error (Sys_Get_LastError)."""
+
+
+NO_ROOM_FOR_A_THREAD = """main 0: START_WITH(0, 0, 0); START_WITH(0, 1, 0); START_KERNEL(0, 0, 0); FAIL(0, 1, 0); \
+LATER(1, 0, 0); START_WITH(0, 0, 0)
+thread 1: START_JOINABLE(0, 3, 4)
+thread 3: FAIL(0, 1, 0); START_WITH(0, 0, 0)"""
+"""The heap's holes are too small for a thread. Not every place of the interrupt explains the records until there."""
 
 
 def test_the_readme_states_every_planted_fault() -> None:

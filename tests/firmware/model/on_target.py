@@ -64,12 +64,14 @@ class Comparison:
         if executor.k.peak > self.heap:
             return None
         seen = self.run(program, LIMITS["MOST_RECORDS"] if executor.later_used else len(alone))
-        wanted, lost = alone, executor.k.events_lost
-        for execution, records in executions(program, self.sizes, self.base, seen):
-            wanted, lost = without_final_state(records), execution.k.events_lost
-            if comparable(seen) == comparable(wanted):
+        closest, wanted, lost = -1, alone, 0
+        for execution, everything in executions(program, self.sizes, self.base, seen):
+            records = without_final_state(everything)
+            if comparable(seen) == comparable(records):
                 self.compared += 1
                 return None
+            if agreement(seen, records) > closest:
+                closest, wanted, lost = agreement(seen, records), records, execution.k.events_lost
         if is_out_of_memory(seen, wanted) or self.lost > lost:
             return None  # a fragmented heap, which the model does not know
         return Difference(0, comparable(seen), comparable(wanted))
@@ -208,6 +210,12 @@ class KilobotCpu(Comparison):
 
 def without_final_state(records: list[Record]) -> list[Record]:
     return [record for record in records if record[1] != Kind.FINAL]
+
+
+def agreement(seen: list[Record], wanted: list[Record]) -> int:
+    """Return the number of records before the first that differs."""
+    pairs = zip(comparable(seen), comparable(wanted), strict=False)
+    return next((n for n, (a, b) in enumerate(pairs) if a != b), min(len(seen), len(wanted)))
 
 
 def is_out_of_memory(seen: list[Record], wanted: list[Record]) -> bool:
