@@ -41,8 +41,9 @@ def image_for(brain: str, home: Path = Path(), kind: str = EPUCK.name) -> Path |
     if not is_own:
         raise ValueError(f"--brain {brain}: there is no firmware/apps/{application} beside this package")
     out = _output_folder(paths.firmware(), application)
-    _make(brain, paths.firmware(), f"APP={application}", f"OUT={out}", f"PYTHON={sys.executable}")
-    return out / "firmware.elf"
+    image = out / "firmware.elf"
+    _make(brain, image, paths.firmware(), f"APP={application}", f"OUT={out}", f"PYTHON={sys.executable}")
+    return image
 
 
 def _kilobot_image(brain: str, home: Path) -> Path:
@@ -56,8 +57,9 @@ def _kilobot_image(brain: str, home: Path) -> Path:
         load_avr_image(str(path))
         return path
     out = _output_folder(folder, "")
-    _make(brain, folder, f"PROGRAM={brain}", f"OUT={out}")
-    return out / f"{brain}.elf"
+    image = out / f"{brain}.elf"
+    _make(brain, image, folder, f"PROGRAM={brain}", f"OUT={out}")
+    return image
 
 
 def _output_folder(folder: Path, name: str) -> Path:
@@ -75,9 +77,14 @@ def _output_folder(folder: Path, name: str) -> Path:
     return out
 
 
-def _make(brain: str, folder: Path, *arguments: str) -> None:
-    """Run `make` in a folder of firmware. Raises ValueError if it fails."""
+def _make(brain: str, image: Path, folder: Path, *arguments: str) -> None:
+    """Run `make` in a folder of firmware. Raises ValueError if it fails.
+
+    The first build of an image takes seconds, so a terminal gets a line before it.
+    """
     command = ["make", "-C", str(folder), *arguments]
+    if sys.stderr.isatty() and not image.exists():
+        print(f"building {brain} ...", file=sys.stderr, flush=True)
     try:
         built = subprocess.run(command, capture_output=True, text=True, check=False)
     except OSError as error:
