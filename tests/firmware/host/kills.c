@@ -370,35 +370,35 @@ TEST(a_chain_of_cleanups_that_kill_ends_each_thread_once, "openswarm_cleanup.h: 
     CHECK_EQ(heap_now(), empty);
 }
 
-static sys_service phoenix;
-static int rebirths;
+static sys_service service;
+static int starts;
 static void start_again(void *unused)
 {
     (void)unused;
-    note(Sys_Start_Service(&phoenix) ? 's' : 'r');
+    note(Sys_Start_Service(&service) ? 's' : 'r');
     CHECK(!Sys_Unlock_Mutex(&mutex)); /* given back before the cleanup */
 }
 
-static void burn(void *unused)
+static void end_at_once(void *unused)
 {
     (void)unused;
     CHECK(Sys_Lock_Mutex(&mutex));
-    if (rebirths++ < 4) {
+    if (starts++ < 4) {
         CHECK(Sys_Push_Cleanup(&cleanup, start_again, NULL));
     }
 }
 
 TEST(a_service_without_restarts_is_started_again_by_its_cleanup, "openswarm_service.h: may be started again")
 {
-    static const sys_process_config config = {.entry = burn};
+    static const sys_process_config config = {.entry = end_at_once};
     boot();
     uint16 empty = heap_now();
-    phoenix = (sys_service){.config = &config};
-    CHECK(Sys_Start_Service(&phoenix));
+    service = (sys_service){.config = &config};
+    CHECK(Sys_Start_Service(&service));
     Sys_Sleep(30);
-    CHECK_EQ(rebirths, 5);
+    CHECK_EQ(starts, 5);
     CHECK(strcmp(trace, "ssss") == 0);
-    CHECK(phoenix.pid == 0 && mutex.owner == NULL);
+    CHECK(service.pid == 0 && mutex.owner == NULL);
     CHECK_EQ(heap_now(), empty);
 }
 

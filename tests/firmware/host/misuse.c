@@ -43,7 +43,7 @@ TEST(an_event_whose_block_is_used_again_during_its_delivery, "openswarm.h: Sys_U
     boot();
     CHECK(Sys_Register_Event(E1) && Sys_Subscribe_to_Event(E1, 0, register_again, NULL));
     uint16 before = heap_now();
-    CHECK(Sys_Send_IntEvent(E1, 1) && Sys_Send_IntEvent(E1, 2)); /* the second one dies with its event */
+    CHECK(Sys_Send_IntEvent(E1, 1) && Sys_Send_IntEvent(E1, 2)); /* the second is dropped with its event */
     Sys_Sleep(3);
     CHECK_EQ(deliveries, 2);
     CHECK(Sys_Unregister_Event(E2));
@@ -137,7 +137,7 @@ TEST(a_timer_is_started_and_stopped_by_its_own_handler, "openswarm_timer.h")
     Sys_Sleep(50);
     CHECK_EQ(deliveries, 4);
     CHECK(Sys_Start_Timer(&timer, E1, 9, 1, 1));
-    CHECK(Sys_Unregister_Event(E1)); /* the timer runs on, into nothing */
+    CHECK(Sys_Unregister_Event(E1)); /* the timer continues without an event */
     uint16 lost = Sys_Get_Statistics()->events_lost;
     Sys_Sleep(20);
     CHECK_EQ(Sys_Get_Statistics()->events_lost, lost);
