@@ -31,6 +31,12 @@ struct point *volatile somewhere = (struct point *)0x3001;
 static __attribute__((noinline)) void set(struct point *p, int value) { p->x = value; }
 int main(void) { set(somewhere, 1234); return room.x; }
 """
+LOST = """
+volatile int seen;
+void __attribute__((noinline)) use(void) { seen++; asm volatile("" ::: "w0", "w1", "w2", "w3", "w4", "w5", "w6"); }
+void __attribute__((noinline)) set(int *p, int n) { int twice = 2 * n; seen = twice; use(); *p = 1; }
+int main(void) { set((int *)0x3001, seen); return 0; }
+"""
 PAST_THE_END = """
         .global __reset
         .text
@@ -153,6 +159,12 @@ def test_a_bad_store_is_reported_with_address_and_variables(build, level):
     known = dict(found.frames[0].variables)
     assert known["p"] == "0x3001"
     assert known["value"] in ("1234",) if level == "-O0" else ("1234", "<optimised out>")
+
+
+def test_a_report_names_variables_without_a_value(build):
+    """A variable that optimised code no longer keeps at the fault is listed without a value."""
+    found = fault(build(LOST, "-Os"))
+    assert dict(found.frames[0].variables) == {"p": "0x3001", "n": "<optimised out>", "twice": "<optimised out>"}
 
 
 @pytest.mark.slow
