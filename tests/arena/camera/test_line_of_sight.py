@@ -34,8 +34,11 @@ def test_answers_equal_the_reference_in_swarms_of_any_size_and_density(
         scene = load_scene("clustering").with_values(robots__count=robots + 1, objects__count=objects, **changes)
         for _ in range(6):
             places = [(5 + draw.random() * width, 5 + draw.random() * depth) for _ in range(robots + objects)]
-            own = draw.uniform(5, 295), draw.uniform(5, 295), draw.uniform(-math.pi, math.pi)
-            poses = Poses([own, *((x, y, 0.0) for x, y in places[:robots])], places[robots:])
+            x, y = draw.uniform(5, 295), draw.uniform(5, 295)
+            near = min(places, key=lambda place: math.dist(place, (x, y)))  # every second robot looks there
+            towards = math.atan2(near[1] - y, near[0] - x) - traits.yaw
+            own = x, y, draw.choice([draw.uniform(-math.pi, math.pi), towards])
+            poses = Poses([own, *((*place, 0.0) for place in places[:robots])], places[robots:])
             camera = ReferenceCamera(scene, poses, 0, traits=traits)
             seen = LineOfSight(scene, 0, traits).look(poses)
             assert seen == sensor_of(camera), f"seed {base_seed()}: {robots} robots, {objects} objects, from {own}"
