@@ -32,7 +32,7 @@ def test_answers_equal_the_reference_in_swarms_of_any_size_and_density(
     for robots, objects, width, depth in ((1, 0, 200, 100), (2, 1, 60, 40), (12, 20, 280, 280), (150, 120, 250, 280),
                                           (60, 60, 290, 0.01), (80, 0, 40, 40), (0, 90, 150, 150)):  # fmt: skip
         scene = load_scene("clustering").with_values(robots__count=robots + 1, objects__count=objects, **changes)
-        for _ in range(6):
+        for _ in range(12):
             places = [(5 + draw.random() * width, 5 + draw.random() * depth) for _ in range(robots + objects)]
             x, y = draw.uniform(5, 295), draw.uniform(5, 295)
             near = min(places, key=lambda place: math.dist(place, (x, y)))  # every second robot looks there
