@@ -24,9 +24,9 @@ def controllers(
 def _controller(scene: Scene, seed: int, robot: int, program: Program, channel: OpticalChannel | None) -> Controller:
     """Return the controller of one robot."""
     if program.file is not None:
-        from arena.robots.user_controller import OwnController, load_controller
+        from arena.robots.user_controller import UserController, load_controller
 
-        return OwnController(scene, seed, robot, load_controller(program.file))
+        return UserController(scene, seed, robot, load_controller(program.file))
     if program.image is None:
         return ScriptedController(scene, seed, robot, program.controller)
     from arena.robots.firmware_controller import FirmwareController  # scripted trials do not load the emulator

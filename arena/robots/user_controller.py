@@ -101,7 +101,7 @@ class Policy:
             raise SceneError(f"{where}: robot {self._robot}: {type(error).__name__}: {error}") from None
 
 
-class OwnController(ControllerWithoutUart):
+class UserController(ControllerWithoutUart):
     """A user's controller in a trial. It senses at the start of a quantum; its wheel speeds hold until the next step.
 
     A robot whose battery is removed stays at rest (`start.off`)."""

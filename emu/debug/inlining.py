@@ -26,8 +26,12 @@ def inlined_into(debug: DebugInfo, name: str) -> list[str]:
 
 
 def inlined_entries(debug: DebugInfo, name: str) -> tuple[int, ...]:
-    """Return the first program address of each copy of a function that was inlined, ascending."""
-    return tuple(sorted(copy.ranges[0][0] for one in debug.functions for copy in _copies(one) if copy.name == name))
+    """Return the first program address of each copy of a function that was inlined, ascending.
+
+    A copy without code has no address.
+    """
+    copies = (copy for one in debug.functions for copy in _copies(one) if copy.name == name)
+    return tuple(sorted(copy.ranges[0][0] for copy in copies if copy.ranges))
 
 
 def _copies(scope: Scope) -> Iterator[Scope]:
