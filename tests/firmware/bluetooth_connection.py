@@ -22,7 +22,7 @@ class Line:
     def write(self, data: bytes) -> None:
         self.machine.board.bluetooth.feed(data)
 
-    def drop(self) -> None:
+    def discard_received(self) -> None:
         self.heard.clear()
 
     def now(self) -> float:

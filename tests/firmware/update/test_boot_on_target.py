@@ -98,7 +98,7 @@ def test_damage_and_a_cut_in_the_middle_leave_a_robot_that_can_be_reached(robot,
     robot.run(seconds=0.02)
     assert b"it runs\nit runs\n" in line.heard
     assert loader_rows(robot) == own
-    line.drop()
+    line.discard_received()
     robot.reset()
     robot.run(seconds=1.02)
     assert b"it runs\nit runs\n" in line.heard  # after one second without a greeting from a host

@@ -103,7 +103,7 @@ def test_a_robot_takes_checks_and_runs_what_the_host_has(robot, programs):
     assert host.counts.requests > ROWS
     host.activate()
     run_until_stored(robot, program)
-    line.drop()
+    line.discard_received()
     assert HostNeighbour(line, program, 20.0).send(lambda done, total: None) is True  # the robot already has it
     newer = HostNeighbour(line, of(programs[5]), 20.0)
     assert newer.send(lambda done, total: None) is False
