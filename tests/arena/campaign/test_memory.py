@@ -25,7 +25,7 @@ for trials in ("20", "200"):
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(not Path("/proc/self/statm").exists(), reason="needs /proc")
+@pytest.mark.skipif(not Path("/proc/self/statm").exists(), reason="only Linux's /proc tells the resident memory")
 def test_two_hundred_trials_in_one_process_take_the_memory_of_twenty(tmp_path: Path) -> None:
     done = subprocess.run([sys.executable, "-c", RUN, str(tmp_path)], capture_output=True, text=True, timeout=HANG,
                           check=False)  # fmt: skip

@@ -15,7 +15,7 @@ from arena.robots.firmware_controller import FirmwareController
 from arena.scene.loader import FCY, load_scene
 from arena.trial.record import Trial, read_trial
 from arena.world.physics import World
-from tests.arena.robot_programs import BEGIN, ECHO
+from tests.arena.robot_programs import BEGIN, ECHO, SEND_SELECTOR
 from tests.watchdog import HANG
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -156,15 +156,7 @@ def test_a_robot_powered_on_while_the_key_is_held_receives_the_remaining_frames(
 @pytest.mark.parametrize("position", [0, 7, 11, 15])
 def test_the_switch_has_sixteen_positions(assembled: Assembled, position: int, tmp_path: Path) -> None:
     """The firmware reports the selector position, one of sixteen, that it reads on RG6 to RG9 (epuck.md §2)."""
-    image = assembled(f"""{BEGIN}
-        mov     PORTG, w0
-        lsr     w0, #6, w0
-        and     w0, #15, w0
-        mov     #'A', w1
-        add     w0, w1, w0
-        mov     w0, U1TXREG
-        mov     #10, w0
-        mov     w0, U1TXREG
+    image = assembled(f"""{BEGIN}{SEND_SELECTOR}
 1:      bra     1b
 """)
     _, trial = run(image, tmp_path, "--set", f"start.selector={position}", seconds=0.5)

@@ -20,7 +20,7 @@ from arena.trial.record import read_trial
 from arena.world.physics import World, traits_of
 from arena.world.poses import Poses
 from tests.arena.reference_camera import ReferenceCamera
-from tests.arena.robot_programs import BEGIN, REPEATING
+from tests.arena.robot_programs import BEGIN, REPEATING, SEND_SELECTOR
 
 
 def test_groups_have_their_own_firmware_switch_and_number(
@@ -64,16 +64,7 @@ image = "scripted"
 SPEAKER = f"""{BEGIN}
         mov     #'{{letter}}', w0
         mov     w0, U1TXREG
-        mov     PORTG, w0
-        lsr     w0, #6, w0
-        and     w0, #15, w0
-        mov     #'A', w1
-        add     w0, w1, w0
-        mov     w0, U1TXREG
-        mov     #10, w0
-        mov     w0, U1TXREG
-{REPEATING}"""
-
+{SEND_SELECTOR}{REPEATING}"""
 
 
 def test_robots_without_spread_are_equal() -> None:
