@@ -11,7 +11,7 @@ from emu.commands.image_option import add_chip_option, image_of
 from emu.debug.disassembly import Item
 from emu.debug.dwarf.units import debug_of
 from emu.debug.inlining import missing_function
-from emu.dspic30f.state.state import PC_MASK
+from emu.dspic30f.isa.flow import PC_MASK
 from emu.host.command import CommandError, Parser
 from emu.host.exit_status import DONE
 from emu.host.sources import SourceFinder, source_lines

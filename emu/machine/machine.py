@@ -20,7 +20,8 @@ from emu.dspic30f.core import Core
 from emu.dspic30f.engines import make_engine
 from emu.dspic30f.exceptions.faults import RESTART, DebuggerWord, DeviceReset, Violation
 from emu.dspic30f.exceptions.power import DRAIN_CYCLES
-from emu.dspic30f.state.state import PC_MASK, RUN, W15_INITIALISED
+from emu.dspic30f.isa.flow import PC_MASK
+from emu.dspic30f.state.state import RUN, W15_INITIALISED
 from emu.image.model import Image
 from emu.machine import saved_state
 from emu.machine.pc_hooks import PcHook, PcHooks

@@ -13,8 +13,8 @@ from typing import Final, Protocol
 from emu.chips.chip import Chip
 from emu.dspic30f.core import Core
 from emu.dspic30f.engines import Engine
+from emu.dspic30f.isa.flow import PC_MASK
 from emu.dspic30f.state.data_space import WINDOW
-from emu.dspic30f.state.state import PC_MASK
 from emu.image.model import Image
 from emu.system.bus import Tap, tap
 

@@ -11,7 +11,7 @@ from typing import Any
 
 from emu.dspic30f.isa import codec
 from emu.dspic30f.isa.builder import Context
-from emu.dspic30f.isa.flow import Branch, Call, Do, Goto, Repeat, Return, Skip
+from emu.dspic30f.isa.flow import PC_MASK, Branch, Call, Do, Goto, Repeat, Return, Skip
 
 SR, CORCON = 0x42, 0x44
 REGISTERS = {
@@ -21,7 +21,6 @@ REGISTERS = {
 FLAGS = {"C": 0, "Z": 1, "OV": 2, "N": 3, "DC": 8, "SB": 12, "SA": 13, "OB": 14, "OA": 15}
 READ_ONLY_SR = 0x0210  # DA, RA
 Y_RAM = range(0x1800, 0x2800)
-PC_MASK = 0x7FFFFE
 
 
 class RowMachine:

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import re
 
+from emu.avr.core.state import FLASH_BYTES
 from emu.avr.isa.codec import decode, row_of
-
-FLASH_BYTES = 0x8000
 
 
 def disassemble(word: int, second: int = 0, address: int = 0) -> str:

@@ -12,8 +12,9 @@ from dataclasses import dataclass
 from typing import Any, Final, Protocol
 
 from emu.chips.chip import Chip
+from emu.dspic30f.isa.flow import PC_MASK
 from emu.dspic30f.state.registers import NSTDIS
-from emu.dspic30f.state.state import IPL3, IPL_MASK, NOT_REPEATING, PC_MASK, RA, RUN, State
+from emu.dspic30f.state.state import IPL3, IPL_MASK, NOT_REPEATING, RA, RUN, State
 from emu.system.device import flag_since
 from emu.system.rules import Cell, EventSlot, Number, RuleBuilder, cell_of, event_slot
 

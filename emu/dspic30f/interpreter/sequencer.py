@@ -36,6 +36,7 @@ from emu.dspic30f.isa.codec import decode_for_execution
 from emu.dspic30f.isa.debugger_words import is_debug_word
 from emu.dspic30f.isa.facts import Facts, facts_of
 from emu.dspic30f.isa.flow import (
+    PC_MASK,
     Branch,
     Call,
     ClearWatchdog,
@@ -50,7 +51,7 @@ from emu.dspic30f.isa.flow import (
     Sleep,
 )
 from emu.dspic30f.isa.row import Insn
-from emu.dspic30f.state.state import DA, IDLE, MIDDLE, NOT_REPEATING, PC_MASK, RA, RUN, SLEEP, State
+from emu.dspic30f.state.state import DA, IDLE, MIDDLE, NOT_REPEATING, RA, RUN, SLEEP, State
 from emu.system.events import Events
 from emu.system.program import ProgramMemory
 

@@ -7,9 +7,12 @@ be a static int or a builder value. Only the sequencer changes PC, REPEAT and DO
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Literal, TypeAlias
+from typing import Any, Final, Literal, TypeAlias
 
 Value: TypeAlias = Any  # integer type of a builder: int, source expression or LLVM value
+
+PC_MASK: Final = 0x7FFFFE
+"""Bits of a program address: PC has 23 bits and is even (isa.md §1.1)."""
 
 
 @dataclass(frozen=True, slots=True)

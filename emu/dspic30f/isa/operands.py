@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 from typing import TypeAlias
 
 from .fields import Operands
+from .flow import PC_MASK
 from .row import Row
 
 SymbolOf: TypeAlias = Callable[[int, str], str | None]  # address, "code" or "data" -> name
@@ -315,8 +316,8 @@ class Target(Kind):
         if value % 2:
             raise OperandError(f"target {value:#x} is odd")
         if not at.row.fields["n"].signed:
-            if not 0 <= value <= 0x7FFFFE:
-                raise OperandError(f"target {value:#x} is not in 0..0x7ffffe")
+            if not 0 <= value <= PC_MASK:
+                raise OperandError(f"target {value:#x} is not in 0..{PC_MASK:#x}")
             return {"n": value}
         distance = value - (at.pc + 2 * at.row.words)
         words = ((distance & 0x7FFFFF ^ 0x400000) - 0x400000) // 2  # PC arithmetic is modulo 2**23, isa.md §7.1

@@ -33,8 +33,6 @@ NOT_REPEATING, FIRST, MIDDLE, LAST = range(4)
 STACK_POINTER: Final = 15
 W15_INITIALISED: Final = 1 << STACK_POINTER
 
-PC_MASK: Final = 0x7FFFFE
-
 
 class _Register:
     """Descriptor of a 16-bit register at a data address."""

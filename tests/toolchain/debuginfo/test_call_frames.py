@@ -18,6 +18,7 @@ from elftools.dwarf.callframe import FDE, CFARule
 import emu
 from emu.debug.dwarf.location import pieces_of
 from emu.dspic30f.isa.codec import decode_for_execution
+from emu.dspic30f.isa.flow import PC_MASK
 from emu.machine.machine import Machine
 from tests.cases import check_all
 from tests.fuzz.seeds import base_seed
@@ -27,7 +28,6 @@ from tests.toolchain.exec.test_exec import FOLDER, cases_of
 
 SP, RCOUNT, RETURN_ADDRESS = 15, 16, 37
 RCOUNT_AT = 0x36  # address of RCOUNT (registers.csv)
-PC_MASK = 0x7FFFFE
 DEEPEST = 40
 STEPS = 12_000
 """Number of executed instructions per program."""

@@ -13,12 +13,10 @@ from typing import TypeAlias
 from emu.dspic30f.isa.addressing import pop_addresses, push, set_register, signed16, size_of, source
 from emu.dspic30f.isa.builder import Builder
 from emu.dspic30f.isa.fields import Operands
-from emu.dspic30f.isa.flow import Branch, Call, Do, Goto, Repeat, Return, Skip, Value
+from emu.dspic30f.isa.flow import PC_MASK, Branch, Call, Do, Goto, Repeat, Return, Skip, Value
 from emu.dspic30f.isa.row import Does, Row
 
 Condition: TypeAlias = Callable[[Builder], Value]
-
-PC_MASK = 0x7FFFFE  # PC is 23 bits and even (isa.md §1.1)
 
 row = partial(Row, repeat_ok=False)
 two = partial(row, cycles=2)

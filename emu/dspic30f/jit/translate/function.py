@@ -12,7 +12,7 @@ from typing import Final
 
 from emu.dspic30f.interpreter import flow_rules
 from emu.dspic30f.isa.builder import Context
-from emu.dspic30f.isa.flow import Branch, Call, ClearWatchdog, Disi, Flow, Goto, Repeat, Return, Skip, Sleep
+from emu.dspic30f.isa.flow import PC_MASK, Branch, Call, ClearWatchdog, Disi, Flow, Goto, Repeat, Return, Skip, Sleep
 from emu.dspic30f.jit.counters.cycle_counters import CycleCounter
 from emu.dspic30f.jit.environment import ARRIVED, NOWHERE, RESUME
 from emu.dspic30f.jit.exit_reasons import (
@@ -40,7 +40,7 @@ from emu.dspic30f.jit.translate.region import Region, Step
 from emu.dspic30f.jit.translate.repeat import RepeatTranslator
 from emu.dspic30f.jit.translate.trace_block import TraceItem, taken_cost, trace_block
 from emu.dspic30f.state.data_space import W_END
-from emu.dspic30f.state.state import IDLE, IPL3, NOT_REPEATING, PC_MASK
+from emu.dspic30f.state.state import IDLE, IPL3, NOT_REPEATING
 from emu.system.events import NEVER
 from emu.system.rules import Rule
 

@@ -12,9 +12,21 @@ from typing import Final
 
 from emu.dspic30f.interpreter.flow_rules import words_skipped
 from emu.dspic30f.isa.facts import Facts, facts_of, flow_of
-from emu.dspic30f.isa.flow import Branch, Call, ClearWatchdog, Disi, Do, Goto, Repeat, Reset, Return, Skip, Sleep
+from emu.dspic30f.isa.flow import (
+    PC_MASK,
+    Branch,
+    Call,
+    ClearWatchdog,
+    Disi,
+    Do,
+    Goto,
+    Repeat,
+    Reset,
+    Return,
+    Skip,
+    Sleep,
+)
 from emu.dspic30f.isa.row import Insn
-from emu.dspic30f.state.state import PC_MASK
 
 LIMIT: Final = 150
 """Maximum number of instructions in a region. Larger regions compile more slowly per instruction (engines.md §4.3)."""

@@ -11,6 +11,7 @@ from typing import Final
 
 from emu.dspic30f.interpreter import flow_rules
 from emu.dspic30f.isa.flow import Repeat
+from emu.dspic30f.isa.rows.multiply import DIVIDE_COUNT
 from emu.dspic30f.jit.exit_reasons import BOUNDARY_WORK, DEADLINE
 from emu.dspic30f.jit.ir.builder import LlvmBuilder, NeedsInterpreter
 from emu.dspic30f.jit.ir.deferred import DeferredEffects
@@ -20,9 +21,6 @@ from emu.dspic30f.jit.ir.variables import MemoryVariables
 from emu.dspic30f.jit.translate.frame import FunctionFrame
 from emu.dspic30f.jit.translate.region import Step
 from emu.dspic30f.state.state import RA
-
-DIVIDE_COUNT: Final = 17
-"""RCOUNT for a divide, which has 18 iterations (isa.md §6.7)."""
 
 
 class RepeatTranslator:
