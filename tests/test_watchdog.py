@@ -30,6 +30,7 @@ def end_of(hang: str) -> subprocess.CompletedProcess[str]:
                           text=True, check=False)  # fmt: skip
 
 
+@pytest.mark.slow
 def test_an_endless_loop_is_ended_with_its_name_and_stacks() -> None:
     done = end_of("while True: pass")
     assert done.returncode == 1
@@ -43,6 +44,7 @@ def test_a_test_that_waits_for_ever_is_ended() -> None:
     assert "has used no CPU for" in done.stderr
 
 
+@pytest.mark.slow
 def test_work_of_a_child_process_counts() -> None:
     """A test that waits for a busy child process is not idle. The child's CPU time counts towards the limit, and the
     child is killed with the test."""

@@ -141,6 +141,7 @@ def test_firmware_takes_a_robot_with_a_lit_red_led_for_an_object(
             assert np.median(left[750:]) == pytest.approx(0.1, abs=0.05)
 
 
+@pytest.mark.slow
 def test_records_are_the_same_for_two_threads(
     clustering_image: Path, assembled: Callable[[str], Path], tmp_path: Path
 ) -> None:

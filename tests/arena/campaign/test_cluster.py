@@ -40,6 +40,7 @@ def test_a_sweep_on_a_cluster_writes_the_same_bytes_as_here(
     assert sorted(one["trial"] for one in hosts) == [1, 2]
 
 
+@pytest.mark.slow
 def test_firmware_travels_to_the_workers(
     address: str, talking_image: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -90,6 +90,7 @@ def test_random_walks_restore_equal_worlds(image_of: Callable[[str], Path]) -> N
     assert tally["back"] + tally["reverse"] + tally["last write"] >= 3
 
 
+@pytest.mark.slow
 def test_other_robots_are_restored_in_the_middle_of_a_quantum(image_of: Callable[[str], Path]) -> None:
     """Two pauses in the middle of a quantum restore the same state of the other robots.
 

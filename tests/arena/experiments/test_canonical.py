@@ -119,6 +119,7 @@ BODY_LED, FRONT_LED = 512, 256
 """Bits of `Reading.leds`: the application lights the body LED while it pushes, the front LED while it moves on."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("x", "heading", "led"), [(60, 0, BODY_LED), (120, 180, FRONT_LED)])
 def test_firmware_pushes_only_where_the_object_hides_the_goal(tmp_path: Path, x: int, heading: int, led: int) -> None:
     """Behind the object a robot pushes it towards the goal; between object and goal it moves on and does not push."""

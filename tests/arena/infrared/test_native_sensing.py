@@ -204,6 +204,7 @@ def test_native_code_equals_python(
     assert calls["begin_quantum"] < 0.5 * in_python["begin_quantum"]
 
 
+@pytest.mark.slow
 def test_rare_conversions_read_the_present_surfaces(
     assembled: Callable[[str], Path], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -223,6 +224,7 @@ def test_rare_conversions_read_the_present_surfaces(
     assert calls["begin_quantum"] < 0.5 * in_python["begin_quantum"]
 
 
+@pytest.mark.slow
 def test_a_conversion_read_in_the_next_quantum_sampled_the_surfaces_of_its_own(
     assembled: Callable[[str], Path], monkeypatch: pytest.MonkeyPatch
 ) -> None:

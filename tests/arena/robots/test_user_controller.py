@@ -96,6 +96,7 @@ def test_a_wrong_file_is_reported_in_one_line(
     assert "Traceback" not in error
 
 
+@pytest.mark.slow
 def test_firmware_and_a_controller_in_python_exclude_each_other(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

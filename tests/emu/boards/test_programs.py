@@ -157,6 +157,7 @@ def test_steps_over_a_minute_are_exact(program):
 # -- infrared ---------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_polled_proximity_driver_measures_the_reference_curve(program):
     """epuck.md §5: the polled driver measures the reference curve with all eight sensors, because 350 us settle to
     better than 0.4 %."""

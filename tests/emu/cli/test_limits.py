@@ -19,6 +19,7 @@ volatile int n;
 __attribute__((noinline)) int never(void) { return n; }
 int main(void) { for (;;) { n = (n + 1) & 0x3FFF; if (n < 0) { never(); } } }
 """
+WATCHED = "break main\nrun\nnext\nwatch n == 99\ncontinue 999999\n"
 
 
 @pytest.fixture(scope="module")
@@ -42,7 +43,7 @@ def test_output_without_room_is_an_error(words):
     assert "Traceback" not in done.stderr
 
 
-@pytest.mark.parametrize("script", ["break never\nrun\n", "break main\nrun\nnext\nwatch n == 99\ncontinue 999999\n"])
+@pytest.mark.parametrize("script", ["break never\nrun\n", pytest.param(WATCHED, marks=pytest.mark.slow)])
 def test_a_script_ends_at_its_time_limit(endless, script):
     done = subprocess.run(
         [sys.executable, "-m", "emu", "debug", "--tui", str(endless), "--seconds", "0.001"], input=script,

@@ -99,7 +99,9 @@ def path(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder / "p.elf"
 
 
-@pytest.mark.parametrize(("engine", "slices"), [("plain", 1 << 30), ("jit", 1 << 30), ("jit", 777)])
+@pytest.mark.parametrize(
+    ("engine", "slices"), [pytest.param("plain", 1 << 30, marks=pytest.mark.slow), ("jit", 1 << 30), ("jit", 777)]
+)
 def test_a_program_with_interrupts_idle_and_a_reset(path: Path, engine: str, slices: int) -> None:
     image, until = load_image(path), 60_000
     stepping, machine = emu.load(path, engine="plain", board=None), emu.load(path, engine=engine, board=None)

@@ -165,6 +165,7 @@ def test_every_application_builds_for_a_host(host: Path, app: str) -> None:
     run_make(FIRMWARE, f"APP={app}", "TARGET=posix", f"OUT={host / app}")
 
 
+@pytest.mark.slow
 def test_listing1_runs_on_a_host_in_real_time(host: Path) -> None:
     """Listing 1 runs on Linux with preemption by signals and with sanitizers.
 

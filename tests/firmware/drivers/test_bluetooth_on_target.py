@@ -13,6 +13,8 @@ from tests.cases import check_all
 from tests.firmware.conftest import Build
 from tests.firmware.drivers.test_drivers_on_target import FCY, robot, steps
 
+pytestmark = pytest.mark.slow
+
 LINE_TIME = FCY // 20
 EVENTS = {"left": 2, "selector": 8, "proximity": 0x11, "motion": 0x12, "sound": 0x13, "led": 0x14}
 
@@ -53,7 +55,6 @@ def talk(reported: tuple[Path, bytes]) -> tuple[Machine, Callable[..., list[str]
     return machine, ask
 
 
-@pytest.mark.slow
 def test_commands_drive_the_robot_and_are_answered(talk) -> None:
     """The SerCom commands D E L B F C S move the robot and are answered (epuck.md §6).
 

@@ -8,6 +8,8 @@ from emu.machine.machine import Machine
 from tests.firmware.conftest import TARGET_APPS, Build
 from tests.firmware.drivers.test_drivers_on_target import FCY, SCENES, plain, robot, steps
 
+pytestmark = pytest.mark.slow
+
 DEFAULTS, OWN, SWALLOW = 0, 1, 2
 GREEN, CYAN, YELLOW, WHITE = 2, 3, 6, 7
 LED_EVENT, LEFT_EVENT = 0x14, 2
@@ -35,7 +37,6 @@ def say(machine: Machine, text: str) -> None:
     machine.run(cycles=FCY // 20)
 
 
-@pytest.mark.slow
 def test_input_devices_pass_what_their_processor_makes_of_it(machine: Machine) -> None:
     """Input devices deliver the result of their processor: the default, a replacement, and the default again.
 

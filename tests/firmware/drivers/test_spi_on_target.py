@@ -57,6 +57,7 @@ def test_bytes_go_both_ways_while_the_slave_is_selected(path: Path) -> None:
     assert turret.machine.peek("LATG") & RG9, "let go between transfers"
 
 
+@pytest.mark.slow
 def test_the_processor_is_exchanged_while_the_program_runs(path: Path) -> None:
     """The SPI processor receives sent and received bytes and may refuse the received ones; it is exchanged at run
     time."""

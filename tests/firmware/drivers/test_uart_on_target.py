@@ -86,6 +86,7 @@ def started(path: Path) -> tuple[Machine, bytearray]:
     return machine, said
 
 
+@pytest.mark.slow
 def test_a_message_of_any_size_goes_out_whole_and_takes_what_is_said(path: Path) -> None:
     """A message of 65 bytes is sent completely; a fixed buffer of 64 bytes would always refuse it."""
     machine, said = started(path)

@@ -17,6 +17,8 @@ from emu.machine.machine import Machine
 from tests.firmware.conftest import TARGET_APPS, Build
 from tests.firmware.drivers.test_drivers_on_target import captured, noise, robot, window
 
+pytestmark = pytest.mark.slow
+
 SENT, RECEIVED = 0, 1
 """Field indices in sys_infrared_statistics."""
 
@@ -26,7 +28,6 @@ def statistics(machine: Machine) -> tuple[int, ...]:
     return struct.unpack("<7H", bytes(machine.record.bytes[at : at + 14]))
 
 
-@pytest.mark.slow
 def test_the_camera_loses_no_pixel_while_frames_are_sent(image: Build) -> None:
     """The camera captures every pixel while infra-red frames are sent.
 

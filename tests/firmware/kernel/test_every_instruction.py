@@ -43,6 +43,7 @@ def test_the_interrupt_makes_every_call_of_the_headers() -> None:
     assert set(re.findall(r"\bSys_\w+(?=\()", refused)) >= refused_in_interrupts()
 
 
+@pytest.mark.slow
 def test_every_allocation_may_fail(image: Build) -> None:
     """If the k-th allocation of a scene fails, for any k, the affected call fails and nothing else changes."""
     *_, (scenes, failures) = fail_every_allocation(image("calls", TARGET_APPS))

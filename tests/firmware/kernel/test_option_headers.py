@@ -199,6 +199,7 @@ def test_the_stack_in_the_headers_is_the_worst_case(path: Path) -> None:
     assert stack == stated
 
 
+@pytest.mark.slow
 def test_the_readme_has_the_measured_bytes(path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert emu(["footprint", str(path), "--json"]) == 0
     sizes = json.loads(capsys.readouterr().out)["options"]

@@ -38,6 +38,7 @@ def test_a_ceiling_bounds_priority_inversion(image: Build) -> None:
     assert machine.peek("waited_ms") >= 2000
 
 
+@pytest.mark.slow
 def test_the_latest_value_keeps_a_slow_handler_within_its_bounds(image: Build) -> None:
     """A quota of the latest value bounds the queue of a slow handler (openswarm_quota.h).
 

@@ -104,6 +104,7 @@ def masked_windows(machine: Machine, cycles: int) -> dict[int, int]:
     return longest
 
 
+@pytest.mark.slow
 def test_nothing_masks_the_stepper_for_long_or_the_camera_at_all(image: Build) -> None:
     """The kernel masks IPL 1-5 for at most 40 Tcy, and IPL 6 only around PWRSAV in the idle loop (kernel.md §6)."""
     machine = load(image("points", TARGET_APPS))

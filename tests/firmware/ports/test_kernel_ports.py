@@ -173,6 +173,7 @@ def check_stress(said: bytes, reports: int) -> None:
     assert len(set(heaps)) == 1
 
 
+@pytest.mark.slow
 def test_stress_on_the_kilobot(tmp_path: Path) -> None:
     """The stress application with six threads and eight events runs 20 s of random actions on the Kilobot."""
     check_stress(said_by_kilobot(make("kilobot", "stress", tmp_path), 20.2), 18)

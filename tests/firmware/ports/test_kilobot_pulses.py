@@ -37,7 +37,7 @@ def image(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return make("kilobot", "kilobot_infrared", tmp_path_factory.mktemp("pulses"), apps=TARGET_APPS)
 
 
-@pytest.fixture(params=SIMULATORS)
+@pytest.fixture(params=[pytest.param("simavr", marks=pytest.mark.slow), "emulator"])
 def swarm(request: pytest.FixtureRequest) -> Iterator[Open]:
     """Return a function that creates a swarm for one test, in simavr and in the project's emulator.
 

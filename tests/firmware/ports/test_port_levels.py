@@ -57,9 +57,9 @@ def said(tmp_path: Path, priority: str, call: str, text: bytes) -> bytes:
     ("priority", "call"),
     [
         ("0x40", "Sys_Send_IntEvent(PRESSED, 3)"),
-        ("0x40", "Sys_Sleep(1)"),
-        ("0", "(void)Sys_Set_LED(0, true)"),
-        ("0xF0", "Sys_Send_IntEvent(PRESSED, 3)"),
+        pytest.param("0x40", "Sys_Sleep(1)", marks=pytest.mark.slow),
+        pytest.param("0", "(void)Sys_Set_LED(0, true)", marks=pytest.mark.slow),
+        pytest.param("0xF0", "Sys_Send_IntEvent(PRESSED, 3)", marks=pytest.mark.slow),
     ],
 )
 def test_a_call_at_a_wrong_priority_stops_the_system(tmp_path: Path, priority: str, call: str) -> None:
@@ -67,7 +67,7 @@ def test_a_call_at_a_wrong_priority_stops_the_system(tmp_path: Path, priority: s
     assert b"sent" not in said(tmp_path, priority, call, STOPPED)
 
 
-@pytest.mark.parametrize("priority", ["0x50", "0xE0"])
+@pytest.mark.parametrize("priority", ["0x50", pytest.param("0xE0", marks=pytest.mark.slow)])
 def test_a_call_at_a_permitted_priority_passes(tmp_path: Path, priority: str) -> None:
     assert b"sent" in said(tmp_path, priority, "Sys_Send_IntEvent(PRESSED, 3)", rb"sent\n(.|\n)*on\n(.|\n)*on\n")
 

@@ -55,9 +55,13 @@ def overflowing(tmp_path: Path) -> Path:
 
 
 DROPS = "DEFINES=-DSYS_ON_OVERFLOW=SYS_DROP_THREAD"
+
+SLOW_BOARDS = [pytest.param(board, marks=pytest.mark.slow) for board in BOARDS]
+"""QEMU's targets in tests that also run on the Kilobot: each builds a kernel of its own."""
 """Make variable by which a stack overflow ends only its thread."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("words", "reported"), [((), b"stack trap at 0x0:0 in thread 2"), ((DROPS,), b"overflow: thread 2")]
 )
@@ -164,7 +168,7 @@ int main(void)
 """
 
 
-@pytest.mark.parametrize("target", ["kilobot", *BOARDS])
+@pytest.mark.parametrize("target", ["kilobot", *SLOW_BOARDS])
 def test_an_overflow_of_the_kernel_stack_stops_the_system(target: str, tmp_path: Path) -> None:
     """An overflow of the kernel stack stops the system: at once with an MPU, on AVR and RISC-V after the handlers.
 
@@ -243,7 +247,7 @@ int main(void)
 """
 
 
-@pytest.mark.parametrize("target", ["epuck", "kilobot", *BOARDS])
+@pytest.mark.parametrize("target", ["epuck", "kilobot", *SLOW_BOARDS])
 def test_a_superfluous_request_to_switch_is_harmless(target: str, image: Build, tmp_path: Path) -> None:
     """A thread continues after a superfluous request to switch (hal_cpu.h: hal_slice_force).
 

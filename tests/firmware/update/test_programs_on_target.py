@@ -101,6 +101,7 @@ def test_the_version_is_not_written_where_it_would_be_lost(capsys):
     assert "made.hex: the version would be lost" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_other_images_are_no_programs(image):
     firmware = load_image(image("programs", TARGET_APPS))
     assert not is_program(firmware)

@@ -71,6 +71,7 @@ def test_forged_and_replayed_programs_are_refused(tmp_path):
     assert frames > 3 * 20 * 64
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("line", "replacement", "failure"),
     [
@@ -90,6 +91,7 @@ def test_the_attacks_succeed_without_a_check(tmp_path, line, replacement, failur
     assert failure in done.stdout
 
 
+@pytest.mark.slow
 def test_power_may_fail_at_every_operation(tmp_path):
     """Updates with tags and kept versions survive a power failure at each operation, and one at the next start.
 
@@ -101,6 +103,7 @@ def test_power_may_fail_at_every_operation(tmp_path):
     assert int(re.search(r"(\d+) damaged images refused", said)[1]) >= 10_000
 
 
+@pytest.mark.slow
 def test_neighbours_may_say_anything(tmp_path):
     assert int(re.search(r"(\d+) messages", on_host("hostile", tmp_path, OPTION))[1]) > 100_000
 

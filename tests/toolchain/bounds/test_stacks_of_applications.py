@@ -112,6 +112,7 @@ def test_interrupts_requested_in_the_deepest_moments_reach_nested_stacks(
     assert plain["greet"] <= planted < nested["greet"]
 
 
+@pytest.mark.slow
 def test_an_interrupt_of_the_entry_of_a_handler_is_measured(tmp_path: Path) -> None:
     """A handler that interrupts another one's entry ends where it returns to that entry, not at the end of both."""
     source, path = tmp_path / "timers.c", tmp_path / "timers.elf"
@@ -122,6 +123,7 @@ def test_an_interrupt_of_the_entry_of_a_handler_is_measured(tmp_path: Path) -> N
     assert rows["__T1Interrupt"].seen == rows["__T2Interrupt"].seen == rows["__T1Interrupt"].bound
 
 
+@pytest.mark.slow
 def test_code_without_main_is_measured_from_its_first_function(tmp_path: Path) -> None:
     """An image without start-up code and main, such as a boot loader, begins at the first C function after reset."""
     start, source, path = tmp_path / "start.s", tmp_path / "loader.c", tmp_path / "loader.elf"

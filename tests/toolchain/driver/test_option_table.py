@@ -109,6 +109,7 @@ def test_generated_command_line_is_taken(number: int, tmp_path: Path, monkeypatc
     assert options.stage == ("link" if number % 4 == 1 else "assemble")
 
 
+@pytest.mark.slow
 def test_a_project_of_mplab_x_builds(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The lines of a debug build: compile, assemble, link with empty words, convert to HEX, make a library."""
     monkeypatch.chdir(tmp_path)
