@@ -24,7 +24,7 @@ SHELVES: Final = 256
 
 
 class DiskCache:
-    """Objects below the folder `where`, at most `limit` bytes in total. `salt` returns bytes that belong to every key.
+    """Objects below the folder `where`, at most `limit` bytes in total. `salt` returns a part of every key.
 
     If the folder cannot be written, objects are not stored. A folder that another user owns or can write is not used.
     """

@@ -51,7 +51,7 @@ class DebugMetadata:
         return 0
 
     def file(self, ref: str) -> tuple[str, str]:
-        """(directory, name) of the DIFile of a node, or of its nearest enclosing scope with a DIFile."""
+        """Return (directory, name) of the DIFile of a node, or of its nearest enclosing scope with a DIFile."""
         if ref not in self._files:
             at = ref
             for _ in range(MAX_DEPTH):
@@ -66,7 +66,7 @@ class DebugMetadata:
         return self._files[ref]
 
     def position(self, ref: str | None) -> tuple[str, int] | None:
-        """(file name, line) of a DILocation or DISubprogram; None without a line.
+        """Return (file name, line) of a DILocation or DISubprogram; None without a line.
 
         The name is relative to the current folder if clang has removed the path of that folder from it."""
         if ref is None or not (line := self.number(ref, "line")):
@@ -76,11 +76,11 @@ class DebugMetadata:
         return (os.path.join(directory, name) if elsewhere else name), line
 
     def declared(self, ref: str | None) -> tuple[str, int] | None:
-        """(file name, line) of a DISubprogram, or of the variable of a DIGlobalVariableExpression."""
+        """Return (file name, line) of a DISubprogram, or of the variable of a DIGlobalVariableExpression."""
         return self.position(self.node(ref).get("var", ref) if ref is not None else None)
 
     def marker(self, ref: str | None) -> list[str]:
-        """Line marker of the assembly text for the code of a DISubprogram or the data of a variable."""
+        """Return the line marker of the assembly text for the code of a DISubprogram or the data of a variable."""
         position = self.declared(ref)
         return [f'# {position[1]} "{position[0]}"'] if position is not None else []
 

@@ -32,7 +32,7 @@ Registers = tuple[int | None, ...]
 
 
 def pair(register: Callable[[int], int | None], number: int) -> int | None:
-    """Return the address in a register and the next one, or in the stack pointer; None if it is unknown."""
+    """Return the address in the stack pointer or in a register pair, whose lower one is `number`; None if unknown."""
     if number == STACK_POINTER:
         return register(number)
     low, high = register(number), register(number + 1)

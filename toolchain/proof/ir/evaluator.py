@@ -337,7 +337,7 @@ class Evaluator(Effects):
             return handler(self, path, i)
         attributes = i.extra["attrs"]
         assert isinstance(attributes, list)
-        target = callee.name if isinstance(callee, GlobalRef) else self._even(path, self.sure(path, callee))
+        target = callee.name if isinstance(callee, GlobalRef) else self._assume_even(path, self.sure(path, callee))
         event = self.record_call(path, target, i.args[:-1], attributes)
         event.is_tail_call = i.extra.get("tail") in ("tail", "musttail")
         if i.extra.get("vararg"):
@@ -347,8 +347,8 @@ class Evaluator(Effects):
             event.value = self.of_type(i.type, lambda t: (self.unknown("result", t.bits), None))
         return event.value
 
-    def _even(self, path: Path, pointer: Term) -> Term:
-        """Assume that a code pointer is even: the machine ignores its lowest bit."""
+    def _assume_even(self, path: Path, pointer: Term) -> Term:
+        """Assume that a code pointer is even, because the machine ignores its lowest bit; return the pointer."""
         path.assumptions.append(z3.Extract(0, 0, pointer) == 0)
         return pointer
 

@@ -430,14 +430,15 @@ class LlvmBuilder:
         self.deferred.check_interrupts = True
 
     def _store_flags(self, address: int, placed: Number, free: int) -> None:
-        """Defer the store of the cycle in which software requests an interrupt by its flag; one flag at most."""
+        """Defer the store of the cycle in which software sets an interrupt flag. The interpreter performs a write that
+        sets several flags."""
         old = self.e.load(pointer(self.e, address), 16)
         rises = placed & free & (old ^ 0xFFFF)
         self.guard((rises & (rises - 1)) == 0)
         self.deferred.stores.append(lambda: self._store_request_cycle(address, rises))
 
     def _store_request_cycle(self, address: int, rises: Number) -> None:
-        """Emit the store of the request cycle, the next cycle, if software sets a flag; one flag at most."""
+        """Emit the store of the next cycle as the request cycle of the flag in `rises`, which has one flag at most."""
         bit = self.ctz16(rises | 0x8000)
         since = pointer(self.e, (bit << 3) + self.layout.offset["irq.since"] + 8 * flag_row(address))
         self.e.store(since, self.select(rises == 0, self.e.load(since, 64), self.now + 1), 64)
