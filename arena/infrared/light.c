@@ -106,7 +106,7 @@ i64 emit(const struct emission *e, i64 line, i64 lit, i64 cycle)
     return append(t, e->receivers, at, line, lit);
 }
 
-// Whether other robots receive no light of a robot from cycle `first` to `last` of the light.
+// Whether other robots receive no light of a robot from cycle `first` to `last` of the trial.
 i64 is_dark(const struct history *t, const struct receivers *r, i64 first, i64 last)
 {
     i64 index = changes_by(t, last);

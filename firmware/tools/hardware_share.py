@@ -38,7 +38,7 @@ def code(file: Path) -> int:
 
 
 def sources(*folders: str) -> list[Path]:
-    """Return all sources in the folders, without devices."""
+    """Return all sources in the folders except those of device drivers."""
     files = [file for folder in folders for file in sorted((OPENSWARM / folder).iterdir())]
     return [file for file in files if file.suffix in SOURCE and file.name not in DEVICES]
 

@@ -6,7 +6,7 @@
 enum { TICK = 1, YIELD, QUEUE, STACK_WORDS = 128 };
 
 volatile unsigned rtos_wanted __attribute__((used));
-volatile unsigned rtos_free[3] __attribute__((used)); /* free heap: initially, with one task more, with two */
+volatile unsigned rtos_free[3] __attribute__((used)); /* free heap: initially, with one more task, with two more */
 static QueueHandle_t queue;
 
 #define NOP() __asm__ volatile("nop" ::: "memory")

@@ -81,7 +81,7 @@ static void remove_quota(const sys_quota *again, uint16 id)
     }
 }
 
-/* Slice locked. most 0: the newest payload replaces the waiting one. */
+/* Called with the slice locked. most 0: the newest payload replaces the waiting one. */
 static sys_error add(sys_quota *q, uint16 id, uint16 most)
 {
     if (event_find(id) == NULL) {

@@ -33,7 +33,7 @@ enum {
 
 static enum { STARTING, LISTEN, RECEIVE, LEADING, SENDING } state;
 static uint8 quiet = SILENCE; /* ticks without a pulse */
-static uint8 backoff, due;    /* ticks: of further silence before an own frame; since the last housekeeping */
+static uint8 backoff, due;    /* ticks: silence still required before an own frame; since last housekeeping */
 static uint16 skew;
 static uint16 seen; /* time of the last processed pulse */
 static uint16 lit_at;
