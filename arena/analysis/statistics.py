@@ -1,8 +1,9 @@
-"""Statistics of the comparison of two runs (experiment-contract.md §5): registered tests, and added ones.
+"""Statistics of the comparison of two runs (experiment-contract.md §5): pre-registered tests and further ones.
 
-Registered: equivalence by two one-sided t tests, Wilcoxon's signed ranks, bootstrap bands. A t interval is unsound for
-few pairs with many ties. Added for this case: the exact sign-flip test with its interval and its smallest possible p,
-and a remark if the measure could not differ. Differences are taken seed by seed; random draws are seeded.
+Pre-registered: equivalence by two one-sided t tests, Wilcoxon's signed ranks, bootstrap bands. A t interval is unsound
+for few pairs with many ties; for this case there are further tests: the exact sign-flip test with its interval and its
+smallest possible p, and a remark if the measure could not differ. Differences are taken seed by seed; random draws are
+seeded.
 """
 
 from __future__ import annotations

@@ -118,7 +118,8 @@ def _cells(table: str) -> list[tuple[str, str, str, str]]:
             for one in keys_of(table)]  # fmt: skip
 
 
-def _about(table: str) -> str:
+def _description(table: str) -> str:
+    """Return the docstrings of the class of a table and of its bases."""
     kind = TABLES.get(table) or LISTS[table]
     texts = [one.__doc__ or "" for one in kind.__mro__ if one is not object]
     return "\n\n".join(textwrap.dedent("    " + text).strip() for text in texts)
@@ -129,7 +130,7 @@ def _listing(table: str, title: str) -> Iterator[str]:
     rows = _cells(table)
     widths = [max(len(row[column]) for row in rows) for column in range(3)]
     yield title
-    yield textwrap.indent(_about(table), "  ")
+    yield textwrap.indent(_description(table), "  ")
     for row in rows:
         line = "  ".join(cell.ljust(width) for cell, width in zip(row[:3], widths, strict=True))
         yield f"    {line}  {row[3]}".rstrip()
@@ -138,7 +139,7 @@ def _listing(table: str, title: str) -> Iterator[str]:
 
 def _page(table: str, title: str) -> Iterator[str]:
     """Yield the lines of a table for the documentation."""
-    yield from (f"## {title}", "", _about(table), "", "| key | type | range | default |", "|---|---|---|---|")
+    yield from (f"## {title}", "", _description(table), "", "| key | type | range | default |", "|---|---|---|---|")
     for key, kind, span, default in _cells(table):
         yield f"| `{key}` | {kind} | {span} | {f'`{default}`' if default[:1] != '(' else default} |"
     yield ""

@@ -54,7 +54,7 @@ def parser() -> argparse.ArgumentParser:
 
 
 class AlternatingPicture:
-    """Picture in one colour, of an object, a robot or the wall, which changes before every frame."""
+    """Picture in the colour of an object, a robot or the wall; the colour changes before every frame."""
 
     def __init__(self, seed: int) -> None:
         self._rng = np.random.default_rng(seed)

@@ -9,7 +9,7 @@ the debug protocol pass unchanged.
 | `says` message | message of the Debug Adapter Protocol for the client |
 | `checkpoint` cycle, seconds, with a pipe | a checkpoint was forked at this time of the robot |
 | `rewind` cycle, count | the trial must go back; the reply `(True,)` announces that a checkpoint will continue |
-| `leaves` state, messages | state and unread messages for this checkpoint; the process ends |
+| `leaves` state, messages | the process ends; state and unread messages for the checkpoint that continues |
 | `left`, `alive` | the client has disconnected; the trial continues without it |
 | `recorded` trial | end of the trial and of its record |
 | `over` fault, controlled | end of the process: the two results of `_run` |

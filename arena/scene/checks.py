@@ -90,7 +90,7 @@ def check_links(errors: TableErrors, links: Points, kinds: Sequence[str]) -> Non
 
 
 def check_off(errors: TableErrors, off: Points, robots: int) -> None:
-    """Check the robots that are switched off, of `robots` robots."""
+    """Check `start.off`: each of the `robots` robots at most once, with a second of the trial. Raises SceneError."""
     taken: set[float] = set()
     for one in off:
         if len(one) != 2 or one[0] not in range(robots) or one[1] < 0 or one[0] in taken:
@@ -100,7 +100,7 @@ def check_off(errors: TableErrors, off: Points, robots: int) -> None:
 
 
 def check_start_poses(errors: TableErrors, key: str, poses: Points, sizes: Sequence[int]) -> None:
-    """Check `start.robot_poses` or `start.object_poses`; `sizes` are the numbers that the pose of each body has."""
+    """Check `start.robot_poses` or `start.object_poses`; `sizes` are the lengths of the bodies' poses."""
     if len(poses) != len(sizes):
         words = f"start.{key} has {len(poses)} poses; expected one for each of {len(sizes)} bodies"
         raise errors.at("start", key, words)
@@ -180,7 +180,8 @@ def check_placed(errors: TableErrors, table: str, one: Any, number: int) -> None
 
 
 def check_given(errors: TableErrors, table: str, given: Mapping[str, Any], one: Any, number: int) -> None:
-    """Check that a table as it is given has no key that another one determines. Raises SceneError."""
+    """Check that the file sets no key that another key of the same table determines or makes useless: `count` beside
+    `poses`, `radius_cm` beside `polygon`. Raises SceneError."""
     if one.place == "poses" and given.get("count", one.count) != one.count:
         words = f"{table}.count is {given['count']}, but {len(one.poses)} poses are listed; remove it"
         raise errors.at(table, "count", words, number)

@@ -388,7 +388,7 @@ class TrialSession:
             self._controllers_context = None
 
     def _restore(self, state: RewindState) -> None:
-        """Continue, in a checkpoint, in place of a process that had run further."""
+        """Continue this checkpoint in place of a process that had run further and left `state`."""
         applied = len(self._actions) - len(self._replay)
         self._actions, self._replay = state.actions, deque(state.actions[applied:])
         self.epoch, self._pace, self._target = state.epoch, 0.0, state.tick

@@ -397,7 +397,7 @@ class World:
         return tick * self.scene.clock.quantum_tcy / 14_745_600
 
     def object_poses(self) -> list[Place]:
-        """Return x and y of each object in cm, and of a polygon its heading in rad."""
+        """Return x and y of each object in cm; for a polygon, also its heading in rad."""
         headings = iter(self.poses.headings)
         return [(*place, next(headings)) if self.scene.kind_of(number).polygon else place
                 for number, place in enumerate(self.poses.objects)]  # fmt: skip

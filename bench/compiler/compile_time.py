@@ -89,12 +89,12 @@ def write_program(folder: Path, lines: int) -> tuple[list[Path], int]:
 
 
 def _cpu_seconds() -> float:
-    """CPU seconds of all processes that have ended."""
+    """Return the CPU seconds of all child processes that have ended."""
     used = resource.getrusage(resource.RUSAGE_CHILDREN)
     return used.ru_utime + used.ru_stime
 
 
-def timed(*words: str, runs: int = RUNS) -> float:
+def driver_seconds(*words: str, runs: int = RUNS) -> float:
     """Return the least CPU seconds of several runs of the driver, each in its own process."""
     found = []
     for _ in range(runs):
@@ -104,7 +104,7 @@ def timed(*words: str, runs: int = RUNS) -> float:
     return min(found)
 
 
-def rebuilt(folder: Path) -> float:
+def rebuild_seconds(folder: Path) -> float:
     """Return the least CPU seconds of `make` after a change of one file of an application, copied to `folder`."""
     shutil.copytree(ROOT / "firmware" / "apps" / APP, folder / APP)
     source = folder / APP / "main.c"
@@ -130,11 +130,12 @@ def main() -> int:
         sources, lines = write_program(folder, options.lines)
         words = ["-Os", *map(str, sources), "-o", str(folder / "x.elf")]
         (folder / "warm.c").write_text("int main(void) { return 0; }\n")
-        timed("-Os", str(folder / "warm.c"), "-o", str(folder / "warm.elf"), runs=1)  # builds the run-time library
-        figures = {"lines": float(lines), "full_s": timed(*words)}
-        figures["application_rebuilt_s"] = rebuilt(folder)
-        figures["usage_error_s"] = timed("--nonsense")
-        figures["empty_main_s"] = timed("-Os", str(folder / "warm.c"), "-o", str(folder / "warm.elf"))
+        empty = ["-Os", str(folder / "warm.c"), "-o", str(folder / "warm.elf")]
+        driver_seconds(*empty, runs=1)  # builds the run-time library
+        figures = {"lines": float(lines), "full_s": driver_seconds(*words)}
+        figures["application_rebuilt_s"] = rebuild_seconds(folder)
+        figures["usage_error_s"] = driver_seconds("--nonsense")
+        figures["empty_main_s"] = driver_seconds(*empty)
     print(json.dumps(figures) if options.json else "\n".join(f"{k:20} {v:8.2f}" for k, v in figures.items()))
     return 0
 

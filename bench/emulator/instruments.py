@@ -173,7 +173,7 @@ def speed(image: Path, name: str, seconds: float) -> float:
 
 
 def measure(image: Path, seconds: float, repeat: int) -> tuple[dict[str, float], dict[str, float]]:
-    """Return medians by instrument: simulated seconds per second of CPU, and share of the runs before and after."""
+    """Return medians by instrument: simulated seconds per CPU second, and as a share of plain runs before and after."""
     speeds: dict[str, list[float]] = {name: [] for name in RUNS}
     shares: dict[str, list[float]] = {name: [] for name in RUNS}
     for _ in range(repeat):

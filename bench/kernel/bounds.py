@@ -145,8 +145,8 @@ class CallMeter:
         return False
 
     def tree_change_hook(self, exchange: range) -> Callable[[], bool]:
-        """Return the hook for an entry to a function that changes the tree. `exchange`: addresses of the function
-        that swaps the reserve; a call from there is not plain."""
+        """Return a hook for the entry of a function that changes the heap's tree of holes. `exchange` is the address
+        range of the function that swaps the reserve; a call that reaches the hook from there is not plain."""
 
         def hook() -> bool:
             top = self.machine.w[15]

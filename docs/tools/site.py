@@ -47,6 +47,10 @@ WHOLE = re.compile(r"(?<![\w-])--?[A-Za-z]\w*|-+&gt;|&lt;-+")
 POWER = re.compile(r"\d+(?:\.\d+)?e-\d+")
 """A number that a browser would break after its minus sign."""
 BLOCK = re.compile(r'<div class="([^"]*\bhighlight\b[^"]*)"(>.*?</div>)', re.DOTALL)
+COLUMN_BLOCK = re.compile(r'(<div class="[^"]*\bcolumns\b[^"]*")(.*?<code>)(.*?)(</code>)', re.DOTALL)
+ENTRY = re.compile(r"( {0,8}\S+(?: \S+)*)( )( +)(?=[^\W\d]|[`<&])")
+"""A name and the gap before its description, in a list of files or commands."""
+CONTINUED = re.compile(r"( {9,})(?=\S)")
 LINE = 96
 """Longest line that fits on a wide screen in the usual size of code."""
 MOST_COLUMNS = {False: 125, True: 145}
@@ -128,6 +132,33 @@ def _sized(block: re.Match[str]) -> str:
     most = MOST_COLUMNS["columns" in block[1] or "diagram" in block[1] or any("  #" in line for line in lines)]
     longest = max((len(line) for line in lines if len(line) <= most), default=0)
     return f'<div class="{block[1]}" style="--columns: {longest}"{block[2]}' if longest > LINE else block[0]
+
+
+def with_rows(text: str) -> str:
+    """Return the HTML of a page whose lists of files and commands have an element for each line, name and gap, so that
+    narrow screens break their lines with a hanging indent."""
+    return COLUMN_BLOCK.sub(_as_rows, text)
+
+
+def _as_rows(block: re.Match[str]) -> str:
+    opening, middle, code, closing = block.groups()
+    lines = code.splitlines(keepends=True)
+    plain = [html.unescape(re.sub("<[^>]+>", "", line)) for line in lines if line.strip()]
+    entries = sum(bool(ENTRY.match(line)) for line in plain)
+    if entries < 0.6 * len(plain) or any(line.startswith("$") or " && " in line for line in plain):
+        return block[0]  # output of a command, or a table of numbers
+    rows = "".join(f'<span class="row">{_as_row(line)}</span>' for line in lines)
+    return f'{opening[:-1]} listing"{middle}{rows}{closing}'
+
+
+def _as_row(line: str) -> str:
+    """Return a line of a list with its name and its gap as elements; the first space of a gap is no part of it."""
+    line = (
+        ENTRY.sub(r'<span class="name">\1</span>\2<span class="gap">\3</span>', line, count=1)
+        if ENTRY.match(line)
+        else line
+    )
+    return CONTINUED.sub(r'<span class="gap">\1</span>', line, count=1) if CONTINUED.match(line) else line
 
 
 def _in_code(pattern: re.Pattern[str], wanted: str, text: str) -> str:
@@ -254,7 +285,7 @@ def main() -> int:
         surroundings = os.environ | {"NO_MKDOCS_2_WARNING": "1"}
         status = subprocess.run([sys.executable, *map(str, words)], cwd=ROOT, env=surroundings, check=False).returncode
     for page in wanted.out.rglob("*.html"):
-        page.write_text(with_sizes(with_breaks(page.read_text(encoding="utf-8"))), encoding="utf-8")
+        page.write_text(with_rows(with_sizes(with_breaks(page.read_text(encoding="utf-8")))), encoding="utf-8")
     # the page for wrong addresses names its style sheets from the server's root, where they may not be
     (wanted.out / "404.html").unlink(missing_ok=True)
     return status

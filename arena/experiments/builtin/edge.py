@@ -1,4 +1,4 @@
-"""Edge following: distance of the last Kilobot from the nearest other one, and its rounds about their centre."""
+"""Edge following: distance of the last Kilobot from its nearest neighbour, and its rounds about the other Kilobots."""
 
 from __future__ import annotations
 

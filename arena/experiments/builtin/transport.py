@@ -32,7 +32,7 @@ def _arrival(series: MetricSeries, until: float) -> float:
 
 
 def _efficiency(series: MetricSeries, until: float) -> float:
-    """Return the straight way that the object has approached the goal, as a share of its path."""
+    """Return by how much the object has come closer to the goal, as a share of the length of its path."""
     part = series.until(until)
     path = part.last("path")
     return float(part.curves["distance"][0] - part.last("distance")) / path if path else math.nan

@@ -74,7 +74,7 @@ def is_program_installed(machine: Machine) -> bool:
 
 
 def measure(image: Path, robots: int, lost: float, most: float, noise: float) -> tuple[list[float], list[float]]:
-    """Return two unordered lists: the seconds after which robots have the program, and after which they call it.
+    """Return two unordered lists: seconds until a robot has received the program, and until its kernel calls it.
 
     Robots that have not reached that state in `most` seconds are missing in the list.
     """
