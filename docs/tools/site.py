@@ -48,9 +48,11 @@ POWER = re.compile(r"\d+(?:\.\d+)?e-\d+")
 """A number that a browser would break after its minus sign."""
 BLOCK = re.compile(r'<div class="([^"]*\bhighlight\b[^"]*)"(>.*?</div>)', re.DOTALL)
 COLUMN_BLOCK = re.compile(r'(<div class="[^"]*\bcolumns\b[^"]*")(.*?<code>)(.*?)(</code>)', re.DOTALL)
-ENTRY = re.compile(r"( {0,8}\S+(?: \S+)*)( )( +)(?=[^\W\d]|[`<&])")
+ENTRY = re.compile(r"^( {0,8}\S+(?: \S+)*)( )( +)(?=[^\W\d]|[`<&])")
 """A name and the gap before its description, in a list of files or commands."""
-CONTINUED = re.compile(r"( {9,})(?=\S)")
+CONTINUED = re.compile(r"^( {9,})(?=\S)")
+SENTENCE = re.compile(r"^(\$ .*|(?!.*\S {2,}\S).+)$", re.MULTILINE)
+"""A line of a session that needs no columns: a command, or output without a gap."""
 LINE = 96
 """Longest line that fits on a wide screen in the usual size of code."""
 MOST_COLUMNS = {False: 125, True: 145}
@@ -144,21 +146,19 @@ def _as_rows(block: re.Match[str]) -> str:
     opening, middle, code, closing = block.groups()
     lines = code.splitlines(keepends=True)
     plain = [html.unescape(re.sub("<[^>]+>", "", line)) for line in lines if line.strip()]
-    entries = sum(bool(ENTRY.match(line)) for line in plain)
-    if entries < 0.6 * len(plain) or any(line.startswith("$") or " && " in line for line in plain):
-        return block[0]  # output of a command, or a table of numbers
+    if any(line.startswith("$") for line in plain):
+        return opening + middle + SENTENCE.sub(r'<span class="sentence">\1</span>', code) + closing
+    entries = [bool(ENTRY.match(line)) for line in plain if not CONTINUED.match(line) and not line.endswith("/\n")]
+    if sum(entries) < 0.6 * len(entries) or any(" && " in line for line in plain):
+        return block[0]  # a table of numbers, or commands
     rows = "".join(f'<span class="row">{_as_row(line)}</span>' for line in lines)
     return f'{opening[:-1]} listing"{middle}{rows}{closing}'
 
 
 def _as_row(line: str) -> str:
     """Return a line of a list with its name and its gap as elements; the first space of a gap is no part of it."""
-    line = (
-        ENTRY.sub(r'<span class="name">\1</span>\2<span class="gap">\3</span>', line, count=1)
-        if ENTRY.match(line)
-        else line
-    )
-    return CONTINUED.sub(r'<span class="gap">\1</span>', line, count=1) if CONTINUED.match(line) else line
+    named = ENTRY.sub(r'<span class="name">\1</span>\2<span class="gap">\3</span>', line)
+    return CONTINUED.sub(r'<span class="gap">\1</span>', named)
 
 
 def _in_code(pattern: re.Pattern[str], wanted: str, text: str) -> str:
