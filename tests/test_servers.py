@@ -7,11 +7,13 @@ import os
 import re
 import signal
 import socket
+import stat
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager, suppress
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -31,6 +33,8 @@ sys.exit(import_module(sys.argv[1] + ".cli").main(sys.argv[2:]))
 """
 """Program that runs a command while the time of day jumps by three years at each reading."""
 ADDRESS = re.compile(r"127\.0\.0\.1:(\d+)(/\S*)?")
+FEW = ("--robots", "1", "--objects", "1")
+SOCKET = "listening on /"
 ECHO = """#include <xc.h>
 int main(void)
 {
@@ -74,6 +78,28 @@ def served(*words: str) -> Iterator[tuple[int, str]]:
         process.wait()
 
 
+@contextmanager
+def on_socket(path: Path, *words: str) -> Iterator[None]:
+    """Start a debugger on a Unix socket meanwhile. Then end it by SIGTERM, which causes no traceback."""
+    process = subprocess.Popen([sys.executable, "-u", "-c", JUMPING_CLOCK, *words, "--socket", str(path)], text=True,
+                               stdout=subprocess.PIPE, stderr=subprocess.STDOUT)  # fmt: skip
+    assert process.stdout is not None
+    try:
+        lines: list[str] = []
+        for line in process.stdout:
+            lines.append(line)
+            if SOCKET in line:
+                break
+        yield
+        process.terminate()
+        lines.append(process.communicate(timeout=HANG)[0])
+        assert process.returncode in (0, -signal.SIGTERM), lines
+        assert "Traceback" not in "".join(lines)
+    finally:
+        process.kill()
+        process.wait()
+
+
 def connected(port: int) -> closing[socket.socket]:
     return closing(socket.create_connection(("127.0.0.1", port), HANG))
 
@@ -109,12 +135,51 @@ def test_the_debugger_serves_its_first_client_before_the_second() -> None:
 
 
 def test_the_debugger_of_a_trial_serves_its_first_client_alone() -> None:
-    few = ("--robots", "1", "--objects", "1", "--robot", "0")
-    with served("arena", "debug", "clustering", *few, "--port", "0") as (port, _), connected(port) as first:
+    words = ("arena", "debug", "clustering", *FEW, "--robot", "0", "--port", "0")
+    with served(*words) as (port, _), connected(port) as first:
         assert b"initialize" in answer(first, request(1, "initialize"))
         with suppress(OSError), connected(port) as second:
             second.sendall(request(1, "initialize"))
         assert b"threads" in answer(first, request(2, "threads"))
+
+
+@pytest.mark.parametrize("words", [("emu", "debug"), ("arena", "debug", "clustering", *FEW, "--robot", "0")])
+def test_a_debugger_on_a_unix_socket_serves_its_first_client(tmp_path: Path, words: tuple[str, ...]) -> None:
+    path = tmp_path / "debug"
+    with on_socket(path, *words), socket.socket(socket.AF_UNIX) as first:
+        assert stat.S_IMODE(path.stat().st_mode) == 0o600
+        first.settimeout(HANG)
+        first.connect(str(path))
+        assert b"initialize" in answer(first, request(1, "initialize"))
+        with suppress(OSError), socket.socket(socket.AF_UNIX) as second:
+            second.connect(str(path))
+            second.sendall(request(1, "initialize"))
+        assert b"threads" in answer(first, request(2, "threads"))
+
+
+def test_the_debugger_of_a_studio_serves_its_first_client_alone() -> None:
+    """The studio opens a port when the page asks for a debugger; it refuses connections after the first client."""
+    with served("arena", "studio", "clustering", *FEW, "--port", "0") as (port, path):
+
+        token = path.partition("=")[2]
+
+        def ask(method: str, place: str, body: bytes = b"") -> Any:
+            head = f"{method} {place} HTTP/1.0\r\nHost: 127.0.0.1:{port}\r\nX-Studio-Token: {token}\r\n"
+            with connected(port) as client:
+                client.sendall(head.encode() + b"Content-Length: %d\r\n\r\n%s" % (len(body), body))
+                said = b"".join(iter(lambda: client.recv(1 << 16), b"")).partition(b"\r\n\r\n")
+            assert b" 200 " in said[0], said
+            return json.loads(said[2])
+
+        ask("POST", "/do", b'{"do": "debug", "robot": 0}')
+        while (debugger := ask("GET", "/more?from=0&epoch=0")["now"]["debugger"]) is None:
+            pass
+        with connected(debugger["port"]) as first:
+            assert b"initialize" in answer(first, request(1, "initialize"))
+            with pytest.raises(ConnectionRefusedError), connected(debugger["port"]):
+                pass
+            assert b"threads" in answer(first, request(2, "threads"))
+            assert ask("GET", "/more?from=0&epoch=0")["now"]["debugger"]["is_connected"]
 
 
 def live(folder: Path) -> list[str]:
@@ -122,8 +187,7 @@ def live(folder: Path) -> list[str]:
 
 
 def studio(_: Path) -> list[str]:
-    few = ["--brain", "scripted", "--robots", "1", "--objects", "1"]
-    return ["arena", "studio", "clustering", *few, "--port", "0"]
+    return ["arena", "studio", "clustering", "--brain", "scripted", *FEW, "--port", "0"]
 
 
 @pytest.mark.parametrize(("words", "status"), [(live, 503), (studio, 200)])

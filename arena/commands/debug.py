@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import socket
 import sys
 import tempfile
 from functools import partial
@@ -20,16 +19,17 @@ from arena.trial.record import RecordError
 from emu.dap.wire import Wire, wire_over
 from emu.host.errors import CommandParser
 from emu.host.exit_status import DONE
+from emu.host.local_server import accept, address_of, listener
 from emu.prompt.appearance import has_colours
 from emu.prompt.reader import Prompt
 
 DESCRIPTION: Final = """\
 debug one robot of a trial; the whole world pauses with it
 
-Serves the Debug Adapter Protocol on standard input and output, or on a TCP port of this machine (see `emu debug
---help`). When the robot stops, the whole world pauses. All robots step, continue and rewind together; /world shows
-their state. A rewind resumes a checkpoint, or runs the trial again from its seed. Launch arguments: stopOnEntry,
-sourceRoots. With --tui, the debugger has a prompt in the terminal instead.
+Serves the Debug Adapter Protocol on standard input and output, or on a TCP port or a Unix socket of this machine
+(see `emu debug --help`). When the robot stops, the whole world pauses. All robots step, continue and rewind
+together; /world shows their state. A rewind resumes a checkpoint, or runs the trial again from its seed. Launch
+arguments: stopOnEntry, sourceRoots. With --tui, the debugger has a prompt in the terminal instead.
 
 With --out the trial is recorded, equal to the byte to `arena run --trials 1`, and the debugger cannot change it. After
 `disconnect` the trial continues to its end; `terminate` ends it without a record."""
@@ -42,6 +42,7 @@ def parser() -> argparse.ArgumentParser:
     add_plan(command)
     command.add_argument("--robot", type=count_or_none, required=True, metavar="N", help="number of the robot, from 0")
     command.add_argument("--port", type=port, metavar="N", help="serve one client on 127.0.0.1:N (0: any free port)")
+    command.add_argument("--socket", type=Path, metavar="PATH", help="serve one client on a new Unix socket, mode 0600")
     command.add_argument("--tui", action="store_true", help="debug at a prompt, or with a script on standard input")
     command.add_argument("--out", type=Path, metavar="FOLDER", help="record the trial in this folder")
     return command
@@ -51,8 +52,8 @@ def run(options: argparse.Namespace) -> int:
     """Run the trial with the debugger; exit status 1 if a robot had a fault.
 
     Raises SceneError, RecordError, LoadError, ValueError."""
-    if options.tui and options.port is not None:
-        raise ValueError("--port and --tui exclude each other")
+    if sum([options.tui, options.port is not None, options.socket is not None]) > 1:
+        raise ValueError("--port, --socket and --tui exclude each other")
     plan = plan_from(options, 1)
     if not 0 <= options.robot < plan.scene.robots.count:
         raise ValueError(f"--robot {options.robot}: the scene has robots 0 to {plan.scene.robots.count - 1}")
@@ -78,7 +79,7 @@ def debug_trial(plan: Plan, folder: Path, options: argparse.Namespace) -> int:
             prompt = Prompt("arena debug", partial(RemoteServer, session), has_colours("auto"))
             status = prompt.serve({}, sys.stdin)
         else:
-            serve_client(session, options.port)
+            serve_client(session, options.socket if options.port is None else options.port)
         session.finish()
     except TrialAbortedError:
         outcome = "no record was written"
@@ -101,9 +102,9 @@ def report_record(session: DebugSession, folder: Path) -> None:
     print(f"arena debug: {trial_path(folder, 1)}", file=sys.stderr)
 
 
-def serve_client(session: DebugSession, port: int | None) -> None:
-    """Serve one client on `port`, or on standard input and output if `port` is None."""
-    if port is None:
+def serve_client(session: DebugSession, place: int | Path | None) -> None:
+    """Serve one client on a port or a Unix socket, or on standard input and output if `place` is None."""
+    if place is None:
         out, sys.stdout = sys.stdout.buffer, sys.stderr  # only protocol messages may reach the client
         wire = Wire(sys.stdin.fileno(), out)
         try:
@@ -111,9 +112,9 @@ def serve_client(session: DebugSession, port: int | None) -> None:
         finally:
             wire.close()
         return
-    with socket.create_server(("127.0.0.1", port)) as listening:
-        print(f"arena debug: listening on 127.0.0.1:{listening.getsockname()[1]}", file=sys.stderr, flush=True)
-        connection, _ = listening.accept()
+    with listener(place) as server:
+        print(f"arena debug: listening on {address_of(server)}", file=sys.stderr, flush=True)
+        connection = accept(server, "arena debug")
     with wire_over(connection) as wire:
         relay(session, wire)
 

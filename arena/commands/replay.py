@@ -5,13 +5,12 @@ from __future__ import annotations
 import argparse
 from contextlib import suppress
 from functools import partial
-from http.server import ThreadingHTTPServer
 from pathlib import Path
 from urllib.parse import parse_qs, urlsplit
 
 from arena.commands.options.arguments import count, duration, port
 from arena.commands.options.trust import add_trust_options, load_trusted
-from arena.replay.http import LOOPBACK, RequestHandler
+from arena.replay.http import LOOPBACK, PageServer, RequestHandler
 from arena.replay.live_feed import Follower
 from arena.replay.page import page
 from arena.replay.video import write_video
@@ -83,9 +82,9 @@ def run(options: argparse.Namespace) -> int:
     return 0
 
 
-def server(follower: Follower, port: int) -> ThreadingHTTPServer:
+def server(follower: Follower, port: int) -> PageServer:
     """Return a server on the loopback address: `/` is the page, `/more?from=N` the samples from number N on."""
-    return ThreadingHTTPServer((LOOPBACK, port), partial(_LiveHandler, follower))
+    return PageServer((LOOPBACK, port), partial(_LiveHandler, follower))
 
 
 class _LiveHandler(RequestHandler):

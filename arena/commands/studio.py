@@ -17,14 +17,13 @@ import webbrowser
 from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext, suppress
 from html import escape
-from http.server import ThreadingHTTPServer
 from pathlib import Path
 from typing import Any, Final
 from urllib.parse import parse_qs, urlsplit
 
 from arena.commands.options.arguments import port
 from arena.commands.options.plan import add_plan, plan_from
-from arena.replay.http import LOOPBACK, RequestHandler
+from arena.replay.http import LOOPBACK, PageServer, RequestHandler
 from arena.replay.page import page
 from arena.scene.loader import FCY
 from arena.studio.process import Call, Studio
@@ -87,10 +86,8 @@ def _browser(address: str) -> Iterator[None]:
         os.unlink(name)
 
 
-class StudioServer(ThreadingHTTPServer):
+class StudioServer(PageServer):
     """HTTP server of one studio, with a random token that its page must send."""
-
-    daemon_threads = True
 
     def __init__(self, studio: Studio, port: int) -> None:
         self.studio: Final = studio

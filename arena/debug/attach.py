@@ -18,6 +18,7 @@ from arena.debug.robot_history import RobotHistory
 from arena.replay.http import LOOPBACK
 from emu.dap.server import Server
 from emu.dap.wire import Message, Wire, wire_over
+from emu.host.local_server import is_own_client
 from emu.machine.machine import Machine
 
 POLL_S: Final = 0.01
@@ -83,7 +84,9 @@ class AttachedRobot(ControlledRobot):
             while self._poll(POLL_S):
                 with suppress(BlockingIOError):
                     connection, _ = self._listener.accept()
-                    break
+                    if is_own_client(connection):
+                        break
+                    connection.close()
             else:
                 return True
             self._listener.close()

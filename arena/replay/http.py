@@ -3,13 +3,24 @@
 from __future__ import annotations
 
 from contextlib import suppress
-from http.server import BaseHTTPRequestHandler, HTTPServer
+from http.server import BaseHTTPRequestHandler, HTTPServer, ThreadingHTTPServer
 from typing import Any, Final
 
 from arena.trial.strict_json import json_text
+from emu.host.local_server import is_own_client
 
 LOOPBACK: Final = "127.0.0.1"
 """The only address on which the servers listen."""
+
+
+class PageServer(ThreadingHTTPServer):
+    """HTTP server on the loopback address for clients of this user."""
+
+    daemon_threads = True
+
+    def verify_request(self, request: Any, client_address: object) -> bool:
+        """Whether to answer a connection; others are closed."""
+        return is_own_client(request)
 
 
 class RequestHandler(BaseHTTPRequestHandler):

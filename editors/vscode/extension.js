@@ -32,7 +32,7 @@ function whole(configuration, name, least, most) {
 /** Returns port and host of an attach configuration. */
 function addressOf(configuration) {
     if (configuration.port === undefined) {
-        throw new Error('attach needs the port of `emu debug --port` or `arena debug --port`');
+        throw new Error('attach needs `port` or `socket`, as given to `emu debug` or `arena debug`');
     }
     return [whole(configuration, 'port', 1, 65535), configuration.host || '127.0.0.1'];
 }
@@ -48,6 +48,9 @@ function started(python, words, cwd) {
 class Adapters {
     async createDebugAdapterDescriptor(session) {
         const configuration = session.configuration;
+        if (configuration.request === 'attach' && configuration.socket) {
+            return new vscode.DebugAdapterNamedPipeServer(String(configuration.socket)); // also a Unix socket
+        }
         if (configuration.request === 'attach') {
             return new vscode.DebugAdapterServer(...addressOf(configuration));
         }

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import argparse
-import socket
 import sys
 from fractions import Fraction
 from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, cast
 
 from emu.boards import BOARDS
@@ -14,6 +14,7 @@ from emu.commands import kilobot_board
 from emu.commands.board_options import add_board_options, board_of, set_up
 from emu.host.command import CommandError, Parser, port, seconds
 from emu.host.exit_status import BAD_INPUT, DONE
+from emu.host.local_server import accept, address_of, listener
 from emu.prompt.appearance import COLOUR_CHOICES, has_colours
 
 if TYPE_CHECKING:
@@ -25,8 +26,9 @@ if TYPE_CHECKING:
 SCRIPT_SECONDS: Final = Fraction(60)
 """Simulated time after which a script ends."""
 DESCRIPTION: Final = """\
-Debug firmware from an editor: a server of the Debug Adapter Protocol on standard input and output, or on a TCP port
-of this machine. With --tui, debug it in the terminal: a prompt with completion and history; its command `help` lists
+Debug firmware from an editor: a server of the Debug Adapter Protocol on standard input and output, on a TCP port of
+this machine, or on a Unix socket. Clients of other users are refused (on a port, Linux only). With --tui, debug it in
+the terminal: a prompt with completion and history; its command `help` lists
 all commands. Without a terminal, standard input is a script with one command per line; the first error ends it. So
 does the time limit of 60 simulated seconds, or of --seconds:
 
@@ -54,7 +56,10 @@ class TimeLimitReached(BaseException):
 def parser() -> Parser:
     made = Parser("debug", DESCRIPTION, "emu debug --port 4711    or    emu debug --tui firmware.elf --selector 3")
     made.add_argument("--port", metavar="N", type=port, help="serve clients one by one on 127.0.0.1:N (0: a free one)")
-    made.add_argument("--once", action="store_true", help="with --port: end after the first client")
+    made.add_argument(
+        "--socket", metavar="PATH", type=Path, help="serve clients one by one on a new Unix socket with mode 0600"
+    )
+    made.add_argument("--once", action="store_true", help="with --port or --socket: end after the first client")
     made.add_argument("--tui", metavar="IMAGE", help="debug this ELF file in the terminal, with the options below")
     made.add_argument(
         "--seconds", metavar="S", type=seconds, help="with --tui: limit of the simulated time (for a script 60)"
@@ -83,18 +88,20 @@ def run(options: argparse.Namespace) -> int:
     from emu.dap.wire import Wire, wire_over
 
     _refuse_options_of_the_prompt(options)
-    if options.port is None:
+    if options.port is not None and options.socket is not None:
+        raise CommandError("--port and --socket exclude each other")
+    place = options.socket if options.port is None else options.port
+    if place is None:
         out, sys.stdout = sys.stdout.buffer, sys.stderr  # only protocol messages may reach the client
         wire = Wire(sys.stdin.fileno(), out)
         try:
             return _serve(wire)
         finally:
             wire.close()
-    with socket.create_server(("127.0.0.1", options.port)) as server:
-        print(f"emu debug: listening on 127.0.0.1:{server.getsockname()[1]}", file=sys.stderr, flush=True)
+    with listener(place) as server:
+        print(f"emu debug: listening on {address_of(server)}", file=sys.stderr, flush=True)
         while True:
-            connection, _ = server.accept()
-            with wire_over(connection) as wire:
+            with wire_over(accept(server, "emu debug")) as wire:
                 status = _serve(wire)
             if options.once:
                 return status
@@ -105,8 +112,8 @@ def _run_prompt(options: argparse.Namespace) -> int:
     from emu.dap.server import Server
     from emu.prompt.reader import Prompt
 
-    if options.port is not None or options.once:
-        raise CommandError("--port and --once cannot be used with --tui")
+    if options.port is not None or options.socket is not None or options.once:
+        raise CommandError("--port, --socket and --once cannot be used with --tui")
     if options.board == kilobot_board.BOARD:
         machine = cast("Machine", kilobot_board.debugged(options, parser()))
     else:

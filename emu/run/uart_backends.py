@@ -16,6 +16,8 @@ import sys
 from collections.abc import Callable
 from typing import Final
 
+from emu.host.local_server import accept, address_of, listener
+
 READ_SIZE: Final = 4096
 
 NO_ROOM: Final = (errno.ENOSPC, errno.EFBIG, errno.EDQUOT)
@@ -132,10 +134,9 @@ def _open_tcp(specification: str, uart: int, with_input: bool) -> ConsolePort:
     text = specification.removeprefix("tcp:")
     if not text.isdecimal() or int(text) > 0xFFFF:
         raise ValueError(f"{specification!r}: expected tcp:PORT with a number up to 65535")
-    with socket.create_server(("127.0.0.1", int(text))) as server:
-        port = server.getsockname()[1]
-        print(f"UART{uart} waits for a connection on 127.0.0.1:{port}", file=sys.stderr, flush=True)
-        connection, _ = server.accept()
+    with listener(int(text)) as server:
+        print(f"UART{uart} waits for a connection on {address_of(server)}", file=sys.stderr, flush=True)
+        connection = accept(server, f"UART{uart}")
     connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
     connection.setblocking(False)
 

@@ -166,7 +166,7 @@ def test_the_status_bar_follows_stops_and_the_present() -> None:
 
 
 @pytest.mark.skipif(shutil.which("node") is None, reason="no node here (Debian package nodejs)")
-def test_a_python_without_the_debugger_is_told(tmp_path: Path) -> None:
+def test_a_python_without_the_debugger_is_reported(tmp_path: Path) -> None:
     """A Python without the debugger is reported, because VS Code shows no error if an adapter ends at once."""
     script = """
         require('module')._load = ((load) => (name, ...rest) => name === 'vscode' ? {} : load(name, ...rest))
@@ -209,9 +209,39 @@ def test_odd_values_of_a_configuration_are_refused_in_words() -> None:
     robot, port = "robot must be a whole number from 0, not ", "port must be a whole number from 1, not "
     assert json.loads(done.stdout) == [
         words, words, ["--seed", "3"], f'{robot}"two"', f"{robot}-1", f"{robot}1.5", f'{robot}""', ["--robot", "2"],
-        "attach needs the port of `emu debug --port` or `arena debug --port`", f'{port}"x"', f"{port}0", f"{port}70000",
-        ["4711", "127.0.0.1"],
+        "attach needs `port` or `socket`, as given to `emu debug` or `arena debug`",
+        f'{port}"x"', f"{port}0", f"{port}70000", ["4711", "127.0.0.1"],
     ]  # fmt: skip
+
+
+@pytest.mark.skipif(shutil.which("node") is None, reason="no node here (Debian package nodejs)")
+def test_it_attaches_to_a_port_or_a_unix_socket() -> None:
+    script = """
+        const made = [];
+        const vscode = {
+            DebugAdapterNamedPipeServer: function (...words) { made.push(['socket', ...words]); },
+            DebugAdapterServer: function (...words) { made.push(['port', ...words]); },
+            EventEmitter: class { },
+            StatusBarAlignment: {},
+            commands: { registerCommand: () => 0 },
+            debug: { registerDebugAdapterDescriptorFactory: (_type, one) => { adapters = one; },
+                     registerDebugConfigurationProvider: () => 0, registerDebugAdapterTrackerFactory: () => 0 },
+            window: { createStatusBarItem: () => ({}), registerTreeDataProvider: () => 0 },
+        };
+        let adapters;
+        require('module')._load = ((load) => (name, ...rest) => name === 'vscode' ? vscode : load(name, ...rest))
+            (require('module')._load);
+        require('./extension.js').activate({ subscriptions: [] });
+        const attach = (values) => adapters.createDebugAdapterDescriptor(
+            { configuration: { request: 'attach', ...values } });
+        (async () => {
+            await attach({ port: 4711 });
+            await attach({ socket: '/run/debug' });
+            console.log(JSON.stringify(made));
+        })();
+    """
+    done = subprocess.run(["node", "-e", script], cwd=FOLDER, capture_output=True, text=True, timeout=HANG, check=True)
+    assert json.loads(done.stdout) == [["port", 4711, "127.0.0.1"], ["socket", "/run/debug"]]
 
 
 @pytest.mark.slow
