@@ -1,7 +1,8 @@
 """Keyed checksums of the files in a cache folder.
 
 Each folder has a random key in a file that only its owner can read. A checksum covers the key, the name of a file and
-its content, so damaged files, files of other caches and files under another name count as absent.
+its content, so damaged files, files of other caches and files under another name count as absent. So do all files
+beside a key that is missing, damaged, no regular file, or of a mode or an owner that lets other users know it.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ import hashlib
 import hmac
 import os
 import secrets
+import stat
 import tempfile
 from contextlib import suppress
 from functools import cache
@@ -43,20 +45,31 @@ def _checksum(key: bytes, name: str, content: bytes) -> bytes:
 
 
 def _key(folder: Path) -> bytes:
-    """Return the folder's key, empty if it has none."""
+    """Return the folder's key, empty if it has none that is secret."""
     path = folder / KEY_FILE
     try:
-        status = path.stat()
+        status = path.lstat()
+        if not stat.S_ISREG(status.st_mode) or not _is_secret(status):
+            return b""
+        return _read(path, status.st_ino, status.st_mtime_ns)
     except OSError:
         return b""
-    return _read(path, status.st_ino, status.st_mtime_ns)
+
+
+def _is_secret(status: os.stat_result) -> bool:
+    """Whether only this user can read and write a file; Windows has no such modes."""
+    return os.name != "posix" or (status.st_uid == os.geteuid() and not stat.S_IMODE(status.st_mode) & 0o077)
 
 
 @cache
 def _read(path: Path, _inode: int, _modified: int) -> bytes:
-    """Return the key in a file; empty if it has another length. Read once per version of the file."""
-    found = path.read_bytes()
-    return found if len(found) == KEY_BYTES else b""
+    """Return the key in a file; empty if it has another length, or zeros only, as after a crash of the file system.
+
+    Read once per version of the file. Raises OSError.
+    """
+    with path.open("rb") as file:
+        found = file.read(KEY_BYTES + 1)
+    return found if len(found) == KEY_BYTES and any(found) else b""
 
 
 def _new_key(folder: Path) -> bytes:
@@ -65,7 +78,7 @@ def _new_key(folder: Path) -> bytes:
     try:
         with os.fdopen(handle, "wb") as file:
             file.write(secrets.token_bytes(KEY_BYTES))
-        if (folder / KEY_FILE).exists() and not _key(folder):
+        if os.path.lexists(folder / KEY_FILE) and not _key(folder):
             (folder / KEY_FILE).unlink()  # a damaged key
         with suppress(FileExistsError):
             os.link(name, folder / KEY_FILE)

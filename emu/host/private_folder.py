@@ -10,6 +10,9 @@ import stat
 import sys
 from functools import cache
 from pathlib import Path
+from typing import Final
+
+ROOT_USER: Final = 0
 
 
 def make_private(folder: Path) -> None:
@@ -20,20 +23,25 @@ def make_private(folder: Path) -> None:
 
 
 def danger(folder: Path) -> str:
-    """Return why a folder must not be used as a cache: another user owns it or can write it. Empty if it is safe.
+    """Return why a folder must not be used as a cache: another user owns it, or can write or replace it. Empty if it is
+    safe.
 
     A missing folder is safe: `make_private` creates it. Windows has no such modes; there every folder is safe.
     """
     try:
-        status = folder.stat()
+        status, link, parent = folder.stat(), folder.lstat(), folder.absolute().parent.stat()
     except OSError:
         return ""
     if os.name != "posix":
         return ""
+    if link.st_uid not in (os.geteuid(), ROOT_USER):  # of a symbolic link, too: its owner could turn it elsewhere
+        return f"it belongs to another user (uid {link.st_uid})"
     if status.st_uid != os.geteuid():
         return f"it belongs to another user (uid {status.st_uid})"
     if status.st_mode & (stat.S_IWGRP | stat.S_IWOTH):
         return f"other users can write it (mode {stat.S_IMODE(status.st_mode):04o})"
+    if parent.st_mode & stat.S_IWOTH and not parent.st_mode & stat.S_ISVTX:
+        return f"other users can replace it (mode {stat.S_IMODE(parent.st_mode):04o} of the folder around it)"
     return ""
 
 

@@ -7,7 +7,7 @@ import stat
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -81,6 +81,73 @@ def test_an_entry_of_another_cache_or_name_is_not_used(cache: Path) -> None:
     assert (objects.get("00key"), len(key.read_bytes())) == (b"again", 32)
     key.unlink()
     assert objects.get("00key") is None
+
+
+def directory(key: Path) -> None:
+    key.mkdir()
+
+
+def dangling_link(key: Path) -> None:
+    key.symlink_to(key.with_name("missing"))
+
+
+def link_to_a_known_key(key: Path) -> None:
+    known = key.with_name("known")
+    known.write_bytes(bytes(range(32)))
+    known.chmod(0o600)
+    key.symlink_to(known)
+
+
+def pipe(key: Path) -> None:
+    os.mkfifo(key)
+
+
+def known_to_others(key: Path) -> None:
+    key.write_bytes(bytes(range(32)))
+    key.chmod(0o640)
+
+
+def zeros(key: Path) -> None:
+    key.write_bytes(bytes(32))
+    key.chmod(0o600)
+
+
+@pytest.mark.parametrize(
+    "damaged",
+    [directory, dangling_link, link_to_a_known_key, pipe, known_to_others, zeros],
+    ids=lambda one: one.__name__,
+)
+def test_a_key_that_is_no_secret_file_counts_as_absent(cache: Path, damaged: Callable[[Path], None]) -> None:
+    """No object is used beside such a key. Storing an object replaces the key, unless it is a folder."""
+    objects = fill(cache)
+    key = cache / "jit" / "key"
+    key.unlink()
+    damaged(key)
+    assert objects.get("00key") is None
+    objects.put("00key", b"again")
+    assert objects.get("00key") == (None if damaged is directory else b"again")
+    assert stat.S_ISREG(key.lstat().st_mode) == (damaged is not directory)
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root can give a link away")
+def test_a_link_of_another_user_is_not_used(cache: Path) -> None:
+    """A symbolic link of another user to a private folder is not used: its owner could turn it to another one."""
+    fill(cache)
+    place = cache.with_name("link")
+    place.symlink_to(cache)
+    assert not danger(place)
+    os.lchown(place, 65534, -1)
+    assert danger(place) == "it belongs to another user (uid 65534)"
+
+
+def test_a_folder_that_others_can_replace_is_not_used(cache: Path) -> None:
+    """A folder below one that all users can write is not used, unless the sticky bit protects its name, as in /tmp."""
+    fill(cache)
+    cache.parent.chmod(0o777)
+    assert danger(cache) == "other users can replace it (mode 0777 of the folder around it)"
+    assert ObjectCache().get("00key") is None
+    cache.parent.chmod(0o1777)
+    assert not danger(cache)
 
 
 @needs_full_device
