@@ -27,7 +27,15 @@ from emu.avr.machine import HZ, UDR0, Atmega328p, Change
 from emu.boards.kilobot.messages import DATA_SIZE, TYPES, Message, PulseDecoder, frame
 from emu.boards.kilobot.observer import DDRB, MCUSR, PORTB, WATCHED, emits_light, is_reset, led_of, motors_of
 from emu.boards.kilobot.overhead import send_frame
-from emu.boards.kilobot.swarm import ADC7, FULL_SCALE, KilobotFaultError, KilobotSetup, KilobotSwarm, microvolts
+from emu.boards.kilobot.swarm import (
+    ADC7,
+    FULL_SCALE,
+    LEAD_TICKS,
+    KilobotFaultError,
+    KilobotSetup,
+    KilobotSwarm,
+    microvolts,
+)
 
 LAMP_CM: Final = 100.0
 """Distance in cm to which the counts of a lamp refer."""
@@ -92,8 +100,8 @@ class KilobotCrowd:
         self.swarm.move_all(10 * places)
         self._set_light(places.tolist())
         end = (tick + 1) * self._quantum * HZ // FCY
-        while self._commands and self._frame_at < end:
-            self._run(self._frame_at)
+        while self._commands and self._frame_at < end + LEAD_TICKS:
+            self._run(max(self._frame_at - LEAD_TICKS, self.swarm.now))
             self._send()
         self._run(end)
 
@@ -137,7 +145,7 @@ class KilobotCrowd:
     def _send(self) -> None:
         """Let the overhead controller send its message; store the time at which the next one begins."""
         start, name, seconds = self._commands[0]
-        self._frame_at = send_frame(self.swarm, frame(Message(bytes(DATA_SIZE), TYPES[name])))
+        self._frame_at = send_frame(self.swarm, frame(Message(bytes(DATA_SIZE), TYPES[name])), self._frame_at)
         if self._frame_at >= (start + seconds) * HZ:
             del self._commands[0]
             self._frame_at = max(self._frame_at, self._command_start())

@@ -72,13 +72,27 @@ static void halt(struct avr *m)
     m->halted_at = m->cycle;
 }
 
-// Wake the sleeping CPU, or advance to the next event that may wake it. Return 0 if nothing can.
+// Advance a CPU that wakes up or waits for the flash, at most to the end of the run: light may still arrive after it.
+static void stall_on(struct avr *m)
+{
+    if (m->cycle < m->stalled_until) {
+        m->cycle = m->stalled_until < m->until ? m->stalled_until : m->until;
+        return;
+    }
+    m->stalled_until = 0;
+    if (m->asleep) {
+        resume(m);
+        find_next_due(m);
+    }
+}
+
+// Begin to wake the sleeping CPU, or advance to the next event that may wake it. Return 0 if nothing can.
 static int sleep_on(struct avr *m)
 {
     u64 from = m->cycle;
     if (m->data[SREG_AT] & FLAG_I && pending_vectors(m) & waking_vectors(m)) {
-        wake_up(m);
-        find_next_due(m);
+        m->resting = 0, m->counts_until = 0;
+        m->stalled_until = m->cycle + wake_up_cycles(m);
         return 1;
     }
     if (!can_continue(m)) {
@@ -103,6 +117,10 @@ static int boundary(struct avr *m)
         if (m->must_reset) {
             watchdog_reset(m);
             find_next_due(m);
+            continue;
+        }
+        if (m->stalled_until) {
+            stall_on(m);
             continue;
         }
         if (m->asleep) {

@@ -43,12 +43,18 @@ void avr_apply_due(struct avr *m)
     apply_events(m, m->cycle);
 }
 
-// Whether an instruction executes next: the CPU is awake, and no interrupt or reset comes before.
+// Whether the CPU sleeps, wakes up or waits for the flash.
+static int is_idle(const struct avr *m)
+{
+    return m->asleep || m->stalled_until > m->cycle;
+}
+
+// Whether an instruction executes next: the CPU is not idle, and no interrupt or reset comes before.
 static int executes_next(struct avr *m)
 {
     avr_apply_due(m);
     u32 pending = m->data[SREG_AT] & FLAG_I ? pending_vectors(m) : 0;
-    return !m->asleep && !m->must_reset && !(pending && !m->shadow);
+    return !is_idle(m) && !m->must_reset && !(pending && !m->shadow);
 }
 
 i64 avr_run_observed(struct avr *m, const struct insn *code, u64 until, struct observation *o)
@@ -65,16 +71,17 @@ i64 avr_run_observed(struct avr *m, const struct insn *code, u64 until, struct o
             break;
         }
         u64 from = m->cycle, end = from + 1, cycles;
-        u32 pc = m->pc, interrupts = m->interrupts, resets = m->resets, slept = m->asleep;
-        if (slept && m->next_due > end)
-            end = m->next_due < last ? m->next_due : last;
+        u32 pc = m->pc, interrupts = m->interrupts, resets = m->resets, idle = is_idle(m);
+        u64 next = m->stalled_until ? m->stalled_until : m->next_due;
+        if (idle && next > end)
+            end = next < last ? next : last;
         __builtin_memcpy(before, m->data + o->watch_from, o->watch_count);
         result = avr_run(m, code, end);
         cycles = m->cycle - from;
         if (m->interrupts != interrupts)
             pc = m->pc, cycles = INTERRUPT_CYCLES;
-        else if (slept)
-            continue; // sleeping and waking up are not counted as steps
+        else if (idle)
+            continue; // idle cycles are not counted as steps
         else if (m->resets != resets)
             pc = m->starts_in_boot ? m->boot_start : 0;
         o->site = (u16)pc, o->last_cycle = from;

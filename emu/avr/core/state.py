@@ -35,6 +35,7 @@ FIELDS: Final[tuple[tuple[str, str, int], ...]] = (
     ("sleep_from", _U64, 1),  # cycle at which the I/O clock stopped; NEVER: it runs
     ("halted_at", _U64, 1),  # cycle at which nothing could wake the CPU any more
     ("slept", _U64, 1),  # cycles that the CPU was asleep
+    ("stalled_until", _U64, 1),  # cycle up to which the CPU wakes up, or waits for the flash; 0: neither
     ("skipped", _U64, 1),  # cycles of waiting loops that were not executed one by one
     ("pc", _U16, 1),  # word address
     ("fault", _U16, 1),  # kind of fault, 0: none
@@ -166,6 +167,7 @@ class Avr(ctypes.Structure):
     overflow_pc: int
     program_changed: int
     slept: int
+    stalled_until: int
     boot_start: int
     avcc_uv: int
     aref_uv: int

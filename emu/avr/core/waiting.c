@@ -98,6 +98,14 @@ static u64 executed(const struct avr *m, u64 cycle)
     return cycle - m->skipped - m->slept;
 }
 
+// End the search; begin the next one after a pause that is longer after each failure.
+static void pause_search(struct avr *m, u64 cycle)
+{
+    m->tracing = 0;
+    m->trace_after = executed(m, cycle) + ((u64)TRACE_PAUSE << m->trace_failures);
+    m->trace_failures += m->trace_failures < TRACE_PAUSES;
+}
+
 static void anchor(struct avr *m, u64 cycle, u32 pc)
 {
     m->trace_from = cycle, m->trace_pc = (u16)pc, m->touched = 0;
@@ -128,10 +136,8 @@ static int trace_on(struct avr *m, u64 cycle, u32 pc)
     }
     if (cycle < m->trace_end)
         return 1;
-    if (m->trace_window >= TRACE_MOST) { // pause, longer after each failure
-        m->tracing = 0;
-        m->trace_after = executed(m, cycle) + ((u64)TRACE_PAUSE << m->trace_failures);
-        m->trace_failures += m->trace_failures < TRACE_PAUSES;
+    if (m->trace_window >= TRACE_MOST) {
+        pause_search(m, cycle);
         return 0;
     }
     m->trace_window *= 2;

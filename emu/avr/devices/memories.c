@@ -86,7 +86,7 @@ static void program_flash(struct avr *m, u32 pc)
         m->program_changed = 1;
         m->deadline = 0;
         if (start >= NRWW_START) {
-            m->cycle += PAGE_CYCLES; // the CPU is halted
+            m->stalled_until = m->cycle + 1 + PAGE_CYCLES; // the CPU is halted
         } else {
             m->data[SPMCSR] |= 1u << RWWSB;
             schedule(m, EVENT_FLASH_DONE, m->cycle + 1 + PAGE_CYCLES);

@@ -57,12 +57,16 @@ static void io_clock_runs(struct avr *m, u64 at)
     timers_schedule(m);
 }
 
+static void pause_search(struct avr *m, u64 cycle);
+
 // Execute SLEEP: stop the clocks of the selected mode.
 static void fall_asleep(struct avr *m, u64 at)
 {
     u32 mode = m->data[SMCR] >> 1 & 7;
     if (!(m->data[SMCR] & 1))
         return;
+    if (m->tracing)
+        pause_search(m, at); // a program that sleeps does not wait in loops
     m->asleep = (u8)(mode + 1);
     if (mode != IDLE)
         io_clock_stops(m, at);
@@ -84,11 +88,15 @@ static u32 waking_vectors(const struct avr *m)
     }
 }
 
-static void wake_up(struct avr *m)
+static u64 wake_up_cycles(const struct avr *m)
 {
-    int deep = m->asleep > POWER_DOWN;
+    return WAKE_CYCLES + (m->asleep > POWER_DOWN ? START_UP_CYCLES : 0);
+}
+
+// Continue after the wake-up time: start the clocks that the sleep mode has stopped.
+static void resume(struct avr *m)
+{
     m->asleep = 0;
-    m->cycle += WAKE_CYCLES + (deep ? START_UP_CYCLES : 0);
     if (m->sleep_from != NEVER)
         io_clock_runs(m, m->cycle);
 }
@@ -107,7 +115,7 @@ static void reset_cpu(struct avr *m, u32 cause)
     m->data[OSCCAL] = 0x80;
     m->pc = m->starts_in_boot ? m->boot_start : 0;
     m->asleep = m->shadow = m->halted = m->started = 0;
-    m->sleep_from = NEVER;
+    m->sleep_from = NEVER, m->stalled_until = 0;
     for (u32 n = 0; n < TIMERS; n++) {
         m->timer_at[n] = m->cycle, m->timer_position[n] = m->timer_turn[n] = 0, m->timer_blocked[n] = 0;
         m->timer_compare[2 * n] = m->timer_compare[2 * n + 1] = 0;

@@ -10,7 +10,8 @@ typedef i64 (*observed_function)(struct avr *m, const struct insn *code, u64 unt
 typedef i64 (*input_function)(struct avr *m, u64 at, i64 kind, i64 value);
 typedef i64 (*observed_input_function)(struct avr *m, u64 at, i64 kind, i64 value, void *observation);
 
-// MARGIN: ticks by which the last instruction may pass the goal of a robot; all light until then must be known.
+// MARGIN: ticks by which the last instruction may pass the goal of a robot; all light until then must be known. The
+// longest one, SBI of EERE, ends 5 cycles after the goal: at most 8 ticks of the slowest clock (SLOWEST in swarm.py).
 enum { ECHO = 9, MARGIN = 8 };
 enum { LAMP = 0xFFFFFFFF }; // sender of light from outside the swarm
 enum { INPUT_ANALOG = 2, CH_HIGH_GAIN = 0, CH_LOW_GAIN = 1, CH_AIN0 = 9 };
@@ -190,13 +191,18 @@ void air_stop(struct air *a, i64 index)
     r->reached = STOPPED;
 }
 
-// Show one robot light from outside the swarm, from tick `at` for `ticks`.
-void air_flash(struct air *a, i64 receiver, i64 at, i64 ticks, i64 high_uv, i64 low_uv)
+// Show one robot light from outside the swarm, from tick `at` for `ticks`. Return 0, or -1 if the robot has already run
+// past `at`.
+i64 air_flash(struct air *a, i64 receiver, i64 at, i64 ticks, i64 high_uv, i64 low_uv)
 {
+    struct robot *r = a->robots + receiver;
     struct edge on = {(u64)at, (u32)high_uv, (u32)low_uv, 1, LAMP}, off = on;
     off.at += (u64)ticks, off.change = -1;
-    if (add_edge(a, a->robots + receiver, on))
-        add_edge(a, a->robots + receiver, off);
+    if (on.at < r->reached && r->reached > r->on_at && r->reached != STOPPED)
+        return -1;
+    if (add_edge(a, r, on))
+        add_edge(a, r, off);
+    return 0;
 }
 
 // Return the last tick of the robot's present cycle.

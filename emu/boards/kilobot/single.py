@@ -11,7 +11,7 @@ from emu.avr.machine import HZ, Atmega328p, Change
 from emu.avr.observation import Observation
 from emu.boards.kilobot.messages import DATA_SIZE, TYPES, Message, frame
 from emu.boards.kilobot.overhead import send_frame
-from emu.boards.kilobot.swarm import KilobotSetup, KilobotSwarm
+from emu.boards.kilobot.swarm import LEAD_TICKS, KilobotSetup, KilobotSwarm
 
 FIRST_COMMAND: Final = HZ // 5
 """Tick of the overhead controller's first message."""
@@ -51,9 +51,10 @@ class SingleKilobot:
         """Run to `tick` (125 ns each), or until the observed robot stops. Raises KilobotFaultError."""
         swarm = self.swarm
         while swarm.now < tick:
-            swarm.run_until(tick if self.next_command is None else min(tick, self.next_command))
-            if swarm.now == self.next_command:
-                after = send_frame(swarm, self._frame)
+            announced = None if self.next_command is None else self.next_command - LEAD_TICKS
+            swarm.run_until(tick if announced is None else min(tick, announced))
+            if self.next_command is not None and swarm.now == announced:
+                after = send_frame(swarm, self._frame, self.next_command)
                 self.next_command = after if after < FIRST_COMMAND + COMMAND_TICKS else None
             if swarm.is_stopped:
                 break

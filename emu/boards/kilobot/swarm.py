@@ -46,6 +46,10 @@ THRESHOLD_UV: Final = 500_000
 BATTERY_UV, BATTERY_NOISE_UV = 2_000_000, 31_000
 """Voltage of ADC6 at half of a battery of 4 V, and its noise, from which kilolib draws random bits. UNVERIFIED."""
 PULSE_TICKS: Final = 9
+LEAD_TICKS: Final = 10
+"""Ticks by which light from outside is announced: a robot runs at most 8 (MARGIN in air.c) past the end of a run."""
+SLOWEST: Final = 0.8
+"""Least frequency of an oscillator divided by the nominal one."""
 EDGES: Final = 256
 """Capacity of a robot's queue of light edges, without the two edges for each other robot that are added (air.c)."""
 ADC6, ADC7, AIN1 = 6, 7, 10
@@ -152,6 +156,8 @@ class KilobotSwarm:
         curve = np.array([(0.0, loss)] if isinstance(loss, int | float) else loss, dtype=float).T
         if not ((curve[1] >= 0) & (curve[1] < 1)).all() or not (np.diff(curve[0]) > 0).all():
             raise ValueError(f"a loss of {loss} is not within 0 and 1, at rising distances")
+        if any(robot.clock < SLOWEST for robot in robots):
+            raise ValueError(f"a clock of {min(robot.clock for robot in robots)} is less than {SLOWEST}")
         if delay < 2 * PULSE_TICKS:
             raise ValueError(f"a delay of {delay} ticks is less than {2 * PULSE_TICKS}")
         self._loss, self._reach = curve, reach
@@ -220,13 +226,20 @@ class KilobotSwarm:
         self._functions["air_stop"](addressof(self._air), robot)
 
     def flash(self, robot: int, after_us: float, distance: float = 0.0) -> None:
-        """Send one robot a light pulse after `after_us`, as strong as that of a robot at `distance` mm."""
-        self.light(robot, self.now + int(after_us * HZ / 1e6), distance)
+        """Send one robot a light pulse after `after_us`, as strong as that of a robot at `distance` mm.
+
+        A pulse within the next LEAD_TICKS is sent at their end.
+        """
+        self.light(robot, self.now + max(int(after_us * HZ / 1e6), LEAD_TICKS), distance)
 
     def light(self, robot: int, tick: int, distance: float = 0.0) -> None:
-        """Send one robot a light pulse of 9 ticks at a future tick; `distance` as in `flash`. At most 100 may wait."""
+        """Send one robot a light pulse of 9 ticks at a tick; `distance` as in `flash`. At most 100 may wait.
+
+        `tick` is at least LEAD_TICKS after the end of the last run. Raises ValueError if the robot has run past it.
+        """
         strengths = [microvolts(counts(gain, distance)) for gain in (HIGH_GAIN_MM, LOW_GAIN_MM)]
-        self._functions["air_flash"](addressof(self._air), robot, tick, PULSE_TICKS, *strengths)
+        if self._functions["air_flash"](addressof(self._air), robot, tick, PULSE_TICKS, *strengths):
+            raise ValueError(f"robot {robot} has run past tick {tick}: announce light {LEAD_TICKS} ticks ahead")
 
     def tick_of(self, robot: int, cycle: int) -> int:
         """Return the tick (125 ns) of the swarm's clock at a cycle of a robot's own clock."""
@@ -351,5 +364,5 @@ def _code() -> dict[str, Callable[..., Any]]:
     """Return the functions of air.c."""
     text = "\n".join([TYPES, declaration(), '#line 1 "emu/boards/kilobot/air.c"',
                       Path(__file__).with_name("air.c").read_text("utf-8")])  # fmt: skip
-    return functions_of(text, "air", {"air_run": (INT, (ADDRESS, INT)), "air_flash": (None, (ADDRESS, *[INT] * 5)),
+    return functions_of(text, "air", {"air_run": (INT, (ADDRESS, INT)), "air_flash": (INT, (ADDRESS, *[INT] * 5)),
                                      "air_stop": (None, (ADDRESS, INT))})  # fmt: skip
