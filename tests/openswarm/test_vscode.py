@@ -57,6 +57,18 @@ def test_snippets_and_first_configurations_fit_the_schema() -> None:
         validate({"type": "openswarm", "request": "launch", "selektor": 3})
 
 
+def test_an_attach_configuration_names_a_port_or_a_socket() -> None:
+    """VS Code marks a configuration that names both or neither."""
+    from jsonschema import ValidationError  # slow to import
+
+    attach = {"type": "openswarm", "request": "attach"}
+    validate(attach | {"port": 4711})
+    validate(attach | {"socket": "/run/debug"})
+    for wrong in ({}, {"port": 4711, "socket": "/run/debug"}):
+        with pytest.raises(ValidationError, match="oneOf"):
+            validate(attach | wrong)
+
+
 def test_a_new_project_fits_the_extension(tmp_path: Path) -> None:
     """The launch configurations of a new project match the extension.
 
