@@ -63,6 +63,8 @@ struct world {
     i64 steps;
     void **polygons; // bodies of the objects that are polygons
     i64 polygon_count;
+    void (*solve)(const void *solver, void *space, f64 dt); // null: `step` has solved
+    const void *solver;
 };
 
 // Distances in cm. Bodies whose edges are nearer than NEAR may touch before the next check. A body is checked again
@@ -232,6 +234,8 @@ void run_quantum(struct world *w, const f64 *wheels)
     if (++w->steps % REST_PERIOD == 0)
         put_to_rest(w);
     w->c.step(w->space, w->dt);
+    if (w->solve)
+        w->solve(w->solver, w->space, w->dt);
 }
 
 // Run `count` quanta from number `first` on. Speeds of robot r in quantum n: speeds[r] + 2 (n mod room). `wheels` is

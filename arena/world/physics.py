@@ -23,6 +23,7 @@ from arena.scene.loader import Scene
 from arena.scene.placement import Place, place_all
 from arena.scene.robot_kind import Drive, RobotKind, Traits
 from arena.scene.schema import ObjectKind
+from arena.world import solver
 from arena.world.poses import PoseBlock, Poses
 from emu.native_library import ADDRESS, INT, address_of, functions
 
@@ -106,6 +107,7 @@ class _World(Structure):
         ("dt", c_double), ("robot_count", c_int64), ("object_count", c_int64),
         ("robots", POINTER(_Robot)), ("discs", POINTER(_Disc)), ("steps", c_int64),
         ("polygons", POINTER(c_void_p)), ("polygon_count", c_int64),
+        ("solve", c_void_p), ("solver", c_void_p),  # null: the library solves
     ]  # fmt: skip
 
 
@@ -214,6 +216,10 @@ class World:
             _Chipmunk(*(_address(ffi.addressof(lib, name)) for name in _Chipmunk.NAMES)), _address(self.space._space),
             self.dt, len(self._robots), len(self.objects), self._robots, self._discs, 0, polygons, len(polygons),
         )  # fmt: skip
+        pivots = [_address(pivot._constraint) for pivot, _ in (*filter(None, self._joints), *self._floor)]
+        self._solver = solver.replace_own(_address(self.space._space), pivots, len(discs), ITERATIONS)
+        if self._solver:
+            self._world.solve, self._world.solver = self._solver.function, self._solver.address
         self._at = addressof(self._world)
         self._wheels = np.zeros((len(self.robots), 2))
         self._wheels_at = self._wheels.ctypes.data

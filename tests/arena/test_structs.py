@@ -15,7 +15,7 @@ from arena.camera import line_of_sight, view
 from arena.infrared import channel, propagation, ring
 from arena.lockstep import threads
 from arena.robots import native_robot
-from arena.world import physics, wheels
+from arena.world import physics, solver, wheels
 from emu.boards.epuck import analog, motors
 from emu.boards.epuck.camera import native_camera
 from emu.native_library import INT, functions
@@ -30,6 +30,7 @@ TWINS: dict[Path, dict[str, type[Structure]]] = {
     ARENA / "camera/renderer.c": {"disc": view.Disc, "led": view.Led, "side": view.Side, "polygon": view.Polygon,
                         "patch": view.Patch, "view": view.View, "rays": view.Rays},
     ARENA / "camera/line_of_sight.c": {"grid": line_of_sight._GridStruct},
+    ARENA / "world/solver.c": {"settled": solver._Settled, "solver": solver._Solver},
     ARENA / "world/wheels.c": {"drive": wheels._Drive},
     ARENA / "world/physics.c": {"chipmunk": physics._Chipmunk, "disc": physics._Disc, "drive": physics._Drive,
                         "robot": physics._Robot,
@@ -84,7 +85,9 @@ def test_a_struct_has_the_offsets_and_the_size_of_its_twin(source: Path, tmp_pat
 def test_every_shared_struct_is_compared() -> None:
     """Every struct that Python and C share is in TWINS; a new one needs an entry unless only C uses it."""
     own = {("renderer.c", "pixel"), ("line_of_sight.c", "beam"), ("physics.c", "vect"), ("physics.c", "twist"),
-           ("propagation.c", "ray"), ("line.c", "scan"), ("motors.c", "state")}  # fmt: skip
+           ("propagation.c", "ray"), ("line.c", "scan"), ("motors.c", "state"),
+           ("solver.c", "array"), ("solver.c", "body"), ("solver.c", "joint_class"), ("solver.c", "joint"),
+           ("solver.c", "contact"), ("solver.c", "arbiter"), ("solver.c", "space")}  # fmt: skip
     found = {(path.name, name) for folder in (ARENA, BOARD) for path in folder.rglob("*.c")
              for name in re.findall(r"^struct (\w+) \{$", path.read_text(), re.M)}  # fmt: skip
     assert found - own == {(path.name, name) for path, twins in TWINS.items() for name in twins}
