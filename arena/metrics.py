@@ -15,13 +15,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
+
+if TYPE_CHECKING:
+    from scipy.sparse import coo_array
 
 Places = NDArray[np.float64]
 """Positions, n x 2, in cm."""
@@ -58,12 +58,17 @@ def clusters(places: Places, reach_cm: float) -> list[int]:
     first objects. Memory grows with the number of adjacent pairs only."""
     if not len(places):
         return []
+    from scipy.sparse.csgraph import connected_components  # imported here: SciPy takes most of the start of a command
+
     labels: list[int] = connected_components(_adjacent(places, reach_cm), directed=False)[1].tolist()
     return labels
 
 
 def _adjacent(places: Places, reach_cm: float) -> coo_array:
     """Return the adjacency matrix of objects nearer to each other than `reach_cm`, as a sparse matrix."""
+    from scipy.sparse import coo_array
+    from scipy.spatial import cKDTree
+
     count = len(places)
     # The tree also returns pairs at exactly this distance, which are not adjacent.
     pairs = cKDTree(places).query_pairs(reach_cm, output_type="ndarray")

@@ -24,10 +24,11 @@ from urllib.parse import parse_qs, urlsplit
 from arena.commands.options.arguments import port
 from arena.commands.options.plan import add_plan, plan_from
 from arena.replay.http import LOOPBACK, PageServer, RequestHandler
-from arena.replay.page import page
+from arena.replay.page import page, waiting_page
 from arena.scene.loader import FCY
 from arena.studio.process import Call, Studio
 from arena.studio.session import CommandRefusedError
+from arena.studio.startup import STAGES, Startup
 from emu.host.errors import CommandParser
 
 EXAMPLE: Final = "example: arena studio clustering --controller A --seed 3"
@@ -57,16 +58,20 @@ def parser() -> argparse.ArgumentParser:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Serve the page until Ctrl-C. Raises SceneError, LoadError, ValueError, OSError."""
-    plan = plan_from(options, 1)
-    studio = Studio(plan, plan.seed)
+    """Serve the page until Ctrl-C; until the trial is ready, the page shows the progress of its creation.
+
+    Raises SceneError, LoadError, ValueError, OSError."""
+    startup = Startup(lambda: plan_from(options, 1))
     try:
-        with server(studio, options.port) as serving:
+        with StudioServer(startup, options.port) as serving:
             print(f"{serving.address} (Ctrl-C ends)", flush=True)
-            with _browser(serving.address) if options.open else nullcontext(), suppress(KeyboardInterrupt):
+            with suppress(KeyboardInterrupt), _browser(serving.address) if options.open else nullcontext():
+                startup.start(serving.shutdown)
                 serving.serve_forever()
+                if startup.error is not None:
+                    raise startup.error
     finally:
-        studio.close()
+        startup.close()
     return 0
 
 
@@ -87,14 +92,24 @@ def _browser(address: str) -> Iterator[None]:
 
 
 class StudioServer(PageServer):
-    """HTTP server of one studio, with a random token that its page must send."""
+    """HTTP server of one studio, with a random token that its page must send. It answers before the trial is ready."""
 
-    def __init__(self, studio: Studio, port: int) -> None:
-        self.studio: Final = studio
+    def __init__(self, source: Studio | Startup, port: int) -> None:
+        self.source: Final = source
         self.token: Final = secrets.token_urlsafe(16)
         super().__init__((LOOPBACK, port), _StudioHandler)
         self.hosts: Final = (f"{LOOPBACK}:{self.server_port}", f"localhost:{self.server_port}")
         self.address: Final = f"http://{self.hosts[0]}/?token={self.token}"
+
+    @property
+    def studio(self) -> Studio:
+        """The studio. Raises CommandRefusedError if its trial is not ready yet."""
+        return self.source.studio if isinstance(self.source, Startup) else self.source
+
+    def progress(self) -> dict[str, Any]:
+        """Return the index of the present stage of the startup, and whether the trial is ready."""
+        is_ready = not isinstance(self.source, Startup) or self.source.is_ready
+        return {"is_ready": is_ready, "stage": self.source.stage if isinstance(self.source, Startup) else len(STAGES)}
 
 
 def server(studio: Studio, port: int) -> StudioServer:
@@ -106,13 +121,19 @@ class _StudioHandler(RequestHandler):
     server: StudioServer
 
     def do_GET(self) -> None:
-        """Handle a GET request: the page, samples, the state of a robot, or the digest of the trial."""
+        """Handle a GET request: the page, the progress of the startup, samples, the state of a robot, or the digest."""
         place = urlsplit(self.path)
         query = {name: values[0] for name, values in parse_qs(place.query).items()}
         if not self._is_authorised(query.get("token", "") if place.path == "/" else self.headers.get(HEADER, "")):
             return
-        studio = self.server.studio
         try:
+            if place.path == "/progress":
+                self.send_json(self.server.progress())
+                return
+            if place.path == "/" and not self.server.progress()["is_ready"]:
+                self.send_page(waiting_page({"token": self.server.token, "header": HEADER, "stages": STAGES}))
+                return
+            studio = self.server.studio
             if place.path == "/":
                 trial, now = studio.ask_all(Call("trial"), Call("status"))
                 quantum = trial.scene.clock.quantum_tcy / FCY
@@ -129,7 +150,7 @@ class _StudioHandler(RequestHandler):
                 self.send_json({"digest": state, "tick": now["tick"]})
             else:
                 self.send_error_text(
-                    404, "no such path; expected /, /more?from=N&epoch=E, /inspect?robot=N, /digest or /do"
+                    404, "no such path; expected /, /more?from=N&epoch=E, /inspect?robot=N, /digest, /progress or /do"
                 )
         except CommandRefusedError as error:
             self.send_error_text(409, str(error))
@@ -138,12 +159,11 @@ class _StudioHandler(RequestHandler):
         """Handle a POST request: execute one command."""
         if not self._is_authorised(self.headers.get(HEADER, "")):
             return
-        studio = self.server.studio
         try:
             if urlsplit(self.path).path != "/do":
                 raise CommandRefusedError("commands must be sent to /do")
             name, arguments = _parse_command(self._body())
-            self.send_json(studio.ask_all(Call(name, (), arguments), Call("status"))[1])
+            self.send_json(self.server.studio.ask_all(Call(name, (), arguments), Call("status"))[1])
         except CommandRefusedError as error:
             self.send_error_text(409, str(error))
 

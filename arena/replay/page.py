@@ -10,6 +10,7 @@ from __future__ import annotations
 import base64
 import hashlib
 import math
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final
 
@@ -40,11 +41,21 @@ def page(trial: Trial, live: bool = False, studio: dict[str, Any] | None = None)
     With `live` the page polls its server for new samples. `studio` holds the data with which it sends commands
     (arena/commands/studio.py)."""
     data = trial_data(trial) | sample_data(trial) | {"live": live, "studio": studio}
-    style, script = _text("style.css"), "".join(map(_text, SCRIPTS))
+    return _document("page.html", "".join(map(_text, SCRIPTS)), data)
+
+
+def waiting_page(data: Mapping[str, Any]) -> str:
+    """Return the text of the page that a studio shows until its trial is ready (arena/commands/studio.py)."""
+    return _document("waiting.html", _text("waiting.js"), data)
+
+
+def _document(template: str, script: str, data: Mapping[str, Any]) -> str:
+    """Return a page made from a file with places for the style, the script, their policy and the data."""
+    style = _text("style.css")
     policy = (f"default-src 'none'; connect-src 'self'; style-src {_hash(style)}; script-src {_hash(script)}; "
               "base-uri 'none'; form-action 'none'")  # fmt: skip
     parts = {"/*STYLE*/\n": style, "/*SCRIPT*/\n": script, "/*POLICY*/": policy, "/*TRIAL*/null": script_json(data)}
-    whole = _text("page.html")
+    whole = _text(template)
     for place, content in parts.items():
         whole = whole.replace(place, content)
     return whole

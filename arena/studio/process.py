@@ -6,7 +6,7 @@ Without a checkpoint, the session replays the trial from its seed.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from threading import Lock
 from typing import Any, Final, NamedTuple
@@ -37,16 +37,18 @@ class Reply(NamedTuple):
 class Studio:
     """Process that runs trial `seed` of `plan`, paused at its start. All methods may be called from any thread.
 
-    Raises SceneError or emu.LoadError if the trial cannot be created.
+    `on_process` is called when the process exists, which then creates the trial. Raises SceneError or emu.LoadError if
+    the trial cannot be created.
     """
 
-    def __init__(self, plan: Plan, seed: int) -> None:
+    def __init__(self, plan: Plan, seed: int, on_process: Callable[[], None] = lambda: None) -> None:
         self._lock: Final = Lock()
         self._checkpoints: Final = CheckpointPool()
         self._pipe, there = pipe()
         self._process: Final = context().Process(target=serve, args=(there.end, plan, seed), daemon=True)
         self._process.start()
         there.drop()
+        on_process()
         self._receive(self._pipe)
 
     def ask(self, name: str, *arguments: Any, **named: Any) -> Any:

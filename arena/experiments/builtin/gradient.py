@@ -6,8 +6,6 @@ from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csr_array
-from scipy.sparse.csgraph import shortest_path
 
 from arena.experiments import Curve, Floats, Measure, TrialSamples
 
@@ -26,6 +24,9 @@ def true_hops(places: Floats, reach_cm: float) -> NDArray[np.int64]:
     """Return the hops of each robot from robot 0 over distances up to `reach_cm`; -1: no path."""
     if not len(places):
         return np.zeros(0, dtype=np.int64)
+    from scipy.sparse import csr_array
+    from scipy.sparse.csgraph import shortest_path
+
     apart = np.hypot(*(places[:, None] - places[None]).transpose(2, 0, 1))
     hops = shortest_path(csr_array(apart <= reach_cm), unweighted=True, indices=0)
     return np.where(np.isfinite(hops), hops, -1).astype(np.int64)

@@ -23,12 +23,14 @@ from typing import Any
 import pytest
 
 from arena.campaign.campaign import Plan, controllers_of
+from arena.cli import main
 from arena.commands import studio as command
 from arena.commands.studio import HEADER, StudioServer, server
 from arena.robots.controller import ScriptedController
 from arena.scene.loader import Scene, load_scene, scripted
 from arena.studio.process import Call, Studio
 from arena.studio.session import CommandRefusedError
+from arena.studio.startup import STAGES, Startup
 from arena.trial import checkpoints
 from arena.trial.trial import run_trial
 from tests.arena.browser import BROWSER, needs_browser, probed
@@ -358,14 +360,63 @@ def test_the_command_ends_with_ctrl_c() -> None:
     with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=ROOT) as process:
         assert process.stdout is not None
         assert process.stderr is not None
-        with urllib.request.urlopen(process.stdout.readline().split()[0], timeout=HANG) as answer:
-            assert 'id="studio"' in answer.read().decode()
+        address = process.stdout.readline().split()[0]
+        end = time.monotonic() + HANG
+        while 'id="studio"' not in (text := urllib.request.urlopen(address, timeout=HANG).read().decode()):
+            assert "check the scene" in text
+            assert time.monotonic() < end
+            time.sleep(0.1)
         process.send_signal(signal.SIGINT)
         assert process.stderr.read() == ""
     assert process.returncode == 0
     bad = [sys.executable, "-m", "arena", "studio", "nowhere"]
     done = subprocess.run(bad, capture_output=True, text=True, cwd=ROOT, check=False)
     assert (done.returncode, done.stderr.count("\n")) == (2, 1)
+
+
+def test_the_page_is_served_before_the_trial_is_ready() -> None:
+    """While the trial is created, `/` is a page that lists what it waits for, `/progress` names the stage, and commands
+    are refused with it. Then the same address is the page of the trial."""
+    may_go_on = threading.Event()
+
+    def slow_plan() -> Plan:
+        assert may_go_on.wait(HANG)
+        return scripted_plan()
+
+    startup = Startup(slow_plan)
+    with StudioServer(startup, 0) as one:
+        threading.Thread(target=one.serve_forever, daemon=True).start()
+        startup.start(one.shutdown)
+        try:
+            address = f"/?token={one.token}"
+            status, text = asked(one, address)
+            assert (status, 'id="studio"' in text) == (200, False)
+            assert all(stage in text for stage in STAGES)
+            assert json.loads(asked(one, "/progress")[1]) == {"is_ready": False, "stage": 0}
+            assert asked(one, "/progress", **{HEADER: ""})[0] == 403
+            refused = 409, f"the trial is not ready: it must {STAGES[0]}"
+            assert asked(one, "/more?from=0&epoch=1") == asked(one, "/do", b'{"do": "pause"}') == refused
+            may_go_on.set()
+            end = time.monotonic() + HANG
+            while not json.loads(asked(one, "/progress")[1])["is_ready"]:
+                assert time.monotonic() < end
+                time.sleep(0.05)
+            assert 'id="studio"' in asked(one, address)[1]
+            assert json.loads(asked(one, "/do", b'{"do": "pause"}')[1])["tick"] == 0
+        finally:
+            may_go_on.set()
+            one.shutdown()
+            startup.close()
+
+
+def test_a_trial_that_cannot_be_created_ends_the_server(capsys: pytest.CaptureFixture[str]) -> None:
+    """A scene without room for its robots is found after the address is printed: one line, and status 2."""
+    words = ["studio", "clustering", "--brain", "scripted", "--port", "0", "--set", "arena.width_cm=40"]
+    assert main(words) == 2
+    printed = capsys.readouterr()
+    assert printed.out.startswith("http://127.0.0.1:")
+    assert printed.err.startswith("arena: ")
+    assert printed.err.count("\n") == 1
 
 
 # -- the page --------------------------------------------------------------------------------------------------------
