@@ -13,8 +13,10 @@ from typing import TYPE_CHECKING, Final, cast
 
 from emu.dap.breakpoints import Breakpoint
 from emu.dap.logged_writes import can_log_writes, logged_writes, site_of
+from emu.debug.dwarf.units import Scope
 from emu.debug.expressions.condition_filters import filter_of
 from emu.debug.history import History
+from emu.debug.inlining import inlined_at
 from emu.debug.inspector import Frame, Inspector
 from emu.debug.processor import Processor
 from emu.debug.threads import Thread, Threads
@@ -302,11 +304,12 @@ class Debuggee:
         return self._step_instruction_or_call(into=False) or StopEvent("step")
 
     def step_line(self, into: bool) -> StopEvent:
-        """Run to the next source line. With `into`, the first line of a called function also counts.
+        """Run to the next source line. With `into`, the first line of a called or inlined function also counts.
 
         Interrupt handlers run to their end.
         """
         frames = self.inspector.frames()
+        inlined = self._inlined()
         entry = frames[0].raw.entry if frames else None
         line = self._line()
         has_entered = False
@@ -326,7 +329,9 @@ class Debuggee:
                 continue
             if entry is not None and self._processor.has_left(top, entry):
                 return StopEvent("step")
-            if (here.file, here.line) != (line and (line.file, line.line)) and here.start == self.machine.pc:
+            is_visible = into or self._inlined() <= inlined
+            is_other = (here.file, here.line) != (line and (line.file, line.line)) and here.start == self.machine.pc
+            if is_other and is_visible:
                 return StopEvent("step")
             if into and (has_entered or self.machine.pc == start):
                 return StopEvent("step")
@@ -390,6 +395,9 @@ class Debuggee:
     def _line(self) -> SourceLine | None:
         return self.inspector.image.lines.find(self.machine.pc)
 
+    def _inlined(self) -> set[Scope]:
+        return inlined_at(self.inspector.debug, self.machine.pc)
+
     # Reverse execution
 
     def reverse_step_instruction(self) -> StopEvent:
@@ -398,7 +406,7 @@ class Debuggee:
 
     def reverse_step_line(self) -> StopEvent:
         """Go back to the start of the previous line of this function or its caller."""
-        start = self.inspector.function_start(self.machine.pc)
+        start, inlined = self.inspector.function_start(self.machine.pc), self._inlined()
         line = self._line()
         if line is not None and line.start != self.machine.pc:  # inside a line, first go back to its start
             line = SourceLine(-1, -1, line.file, -line.line)
@@ -406,6 +414,7 @@ class Debuggee:
             for at, (cycle, pc) in reversed(list(enumerate(positions))):
                 here = self.inspector.image.lines.find(pc)
                 begins = here is not None and here.start == pc and self.inspector.function_start(pc) == start
+                begins = begins and inlined_at(self.inspector.debug, pc) <= inlined
                 if begins and (line is None or here is None or (here.file, here.line) != (line.file, line.line)):
                     self.history.seek(cycle)
                     return StopEvent("step")

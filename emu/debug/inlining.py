@@ -34,6 +34,12 @@ def inlined_entries(debug: DebugInfo, name: str) -> tuple[int, ...]:
     return tuple(sorted(copy.ranges[0][0] for copy in copies if copy.ranges))
 
 
+def inlined_at(debug: DebugInfo, pc: int) -> set[Scope]:
+    """Return the copies of inlined functions that contain the instruction at `pc`."""
+    function = debug.function(pc)
+    return set() if function is None else {scope for scope in function.chain(pc) if scope.kind == "inlined"}
+
+
 def _copies(scope: Scope) -> Iterator[Scope]:
     """Yield all inlined scopes inside a scope."""
     for inner in scope.inner:

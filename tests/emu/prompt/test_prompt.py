@@ -108,6 +108,26 @@ def test_a_function_that_was_inlined_everywhere_stops_at_each_copy(
     assert capsys.readouterr().err.count("'add': inlined into main; add __attribute__((noinline))") == 1
 
 
+@pytest.mark.parametrize("command", ["next", "step"])
+def test_next_steps_over_inlined_functions(tmp_path: Path, capsys: pytest.CaptureFixture[str], command: str) -> None:
+    """`next` stays in the caller and counts the copy as part of its line; `step` enters it. Backwards alike."""
+    source, image = tmp_path / "inlined.c", str(tmp_path / "inlined.elf")
+    source.write_text(
+        "volatile int total, last, seen;\nstatic inline __attribute__((always_inline)) void add(int n)\n{\n"
+        "    total += n;\n    last = total;\n}\n"
+        "int main(void)\n{\n    total = 1;\n    add(seen);\n    total = 9;\n    last = 8;\n    return 0;\n}\n"
+    )
+    assert driver.main(["-g", "-Os", str(source), "-o", image]) == 0
+    commands = ["break inlined.c:9", "run", *3 * [command, "bt"], *2 * [f"reverse-{command}", "bt"]]
+    script = io.StringIO("\n".join(commands) + "\n")
+    assert Prompt("emu debug", lambda client: Server(client, lambda _launch: emu.load(image))).serve({}, script) == 0
+    places = re.findall(r"(?m)^\* #0 (\w+) at inlined.c:(\d+)$", capsys.readouterr().out)
+    if command == "next":
+        assert places == [("main", "10"), ("main", "11"), ("main", "12"), ("main", "11"), ("main", "10")]
+    else:
+        assert places == [("main", "10"), ("add", "4"), ("add", "5"), ("add", "4"), ("main", "10")]
+
+
 def test_a_script_ends_with_the_first_command_that_fails(play: type) -> None:
     played = play("break main", "run", "print nonsense", "print total")
     assert played.status == 2
