@@ -1,6 +1,7 @@
 """Random programs for robots of a swarm: camera, infrared, UART, motors, sleep, interrupts, traps and resets.
 
-A program is generated from a random generator and the kind of camera sensor, as assembly text.
+A program is generated from a random generator and the kind of camera sensor, as assembly text. Each function of PIECES
+returns one piece of it; number `n` makes the labels of the piece unique.
 `tests/fuzz/swarm/fuzz_swarm.py` runs the programs in all modes of a swarm.
 """
 
@@ -19,7 +20,7 @@ Chance = random.Random
 
 
 def _looks(chance: Chance, n: int) -> str:
-    """Read some pixels in a row, by address or by pointer."""
+    """Return code that reads some pixels in a row, by address or by pointer."""
     how = chance.choice((*LONG, *LONG, "mov     [w8], w0", "mov.b   PORTD+1, wreg", "mov     [w8], [w9++]"))
     return f"""
         mov     #PORTD, w8
@@ -32,8 +33,8 @@ l{n}:   {how}
 
 
 def _awaits_line(_chance: Chance, n: int) -> str:
-    """Wait for a falling and a rising edge of HREF. Only one round in 16 waits, and briefly, because reads of the
-    port with PCLK are slow."""
+    """Return code that waits for a falling and a rising edge of HREF. Only one round in 16 waits, and briefly, because
+    reads of the port with PCLK are slow."""
     return f"""
         mov     _turns, w0
         and     w0, #15, w0
@@ -55,7 +56,7 @@ l{n}:   dec     w1, w1
 
 
 def _waits(chance: Chance, n: int) -> str:
-    """Count down a random number."""
+    """Return code that counts down from a random number."""
     return f"""
         mov     #{chance.randrange(1, 1 << chance.randrange(2, 16))}, w1
 l{n}:   dec     w1, w1
@@ -63,17 +64,17 @@ l{n}:   dec     w1, w1
 
 
 def _idles(chance: Chance, _n: int) -> str:
-    """Enter Idle mode one to three times."""
+    """Return code that enters Idle mode one to three times."""
     return "\n        pwrsav  #1" * chance.randrange(1, 4)
 
 
 def _sleeps(_chance: Chance, _n: int) -> str:
-    """Enter Sleep mode with the watchdog on, which ends it in most cases."""
+    """Return code that enters Sleep mode with the watchdog enabled, which ends it in most cases."""
     return "\n        bset    RCON, #5\n        pwrsav  #0"
 
 
 def _turns(chance: Chance, _n: int) -> str:
-    """Turn both motors by four steps, forwards, backwards or in a random sequence."""
+    """Return code that turns both motors by four steps forwards or backwards, or sets three random phases."""
     phases = [0x55, 0x66, 0xAA, 0x99][:: chance.choice((1, 1, -1))]
     if chance.random() < 0.2:
         phases = chance.sample((0x55, 0x66, 0xAA, 0x99, 0x00, 0xA5), 3)
@@ -89,12 +90,12 @@ def _turns(chance: Chance, _n: int) -> str:
 
 
 def _blinks(chance: Chance, _n: int) -> str:
-    """Toggle some LEDs."""
+    """Return code that toggles some LEDs."""
     return f"\n        btg     LATA, #{chance.choice((6, 7, 9, 12))}\n        btg     LATC, #{chance.choice((1, 2))}"
 
 
 def _talks(_chance: Chance, n: int) -> str:
-    """Send a letter and a line end on UART1."""
+    """Return code that sends a letter and a line end on UART1."""
     return f"""
         mov     #0x1FFF, w1
         and     w2, #15, w0
@@ -106,7 +107,7 @@ l{n}:   btss    U1STA, #9
 
 
 def _hears(_chance: Chance, n: int) -> str:
-    """Read up to four bytes from UART1."""
+    """Return code that reads up to four bytes from UART1."""
     return f"""
         btsc    U1STA, #1
         bclr    U1STA, #1
@@ -121,7 +122,7 @@ l{n}:   btss    U1STA, #0
 
 
 def _senses(chance: Chance, _n: int) -> str:
-    """Convert one infrared sensor, with or without a lit emitter."""
+    """Return code that converts one infrared sensor, with or without a lit emitter."""
     lit = chance.choice(("bset    LATF, #7", "bset    LATF, #8", "bset    LATG, #0", "bset    LATG, #1", "nop"))
     return f"""
         {lit}
@@ -140,7 +141,8 @@ def _senses(chance: Chance, _n: int) -> str:
 
 
 def _scans(chance: Chance, _n: int) -> str:
-    """Scan some infrared sensors without pause, and toggle pulse lines, also two at once and by a pointer."""
+    """Return code that scans some infrared sensors without pause, and toggles pulse lines, also two at once and by a
+    pointer."""
     settings = {
         "ADCON1": 0, "ADCSSL": chance.randrange(1, 256) << 8, "ADCON2": 0x400 | chance.randrange(16) << 2,
         "ADCON3": chance.randrange(1, 32) << 8 | chance.randrange(64), "ADCON1 ": 0x80E4,
@@ -160,7 +162,7 @@ def _scans(chance: Chance, _n: int) -> str:
 
 
 def _sets_camera(chance: Chance, _n: int) -> str:
-    """Set a register of the camera by I2C; in 30 % of the cases one that only changes the brightness."""
+    """Return code that sets a register of the camera; in 30 % of the cases one that only changes the brightness."""
     if chance.random() < 0.3:
         return _written(0xD4, chance.randrange(256))
     return _written(
@@ -174,7 +176,7 @@ def _sets_camera(chance: Chance, _n: int) -> str:
 
 
 def _written(register: int, value: int) -> str:
-    """Write a register of the camera by I2C."""
+    """Return code that writes a register of the camera by I2C."""
     steps = "".join(
         f"""
         mov     #{byte:#x}, w0
@@ -193,7 +195,7 @@ def _written(register: int, value: int) -> str:
 
 
 def _guards(chance: Chance, _n: int) -> str:
-    """Raise the CPU priority for a while, or disable interrupts."""
+    """Return code that raises the CPU priority for a while, or disables interrupts."""
     if chance.random() < 0.5:
         return f"\n        disi    #{chance.randrange(1, 3000)}\n        repeat  #{chance.randrange(200)}\n        nop"
     ipl = chance.randrange(1, 8) << 5
@@ -207,14 +209,14 @@ def _guards(chance: Chance, _n: int) -> str:
 
 
 def _traps(chance: Chance, _n: int) -> str:
-    """Cause an address error or a division by zero in some rounds; Python handles these exceptions."""
+    """Return code that causes an address error or a division by zero in some rounds; Python handles both."""
     odd, zero = "\n        mov     #1, w0\n        mov     [w0], w0", "\n        mov     #0, w4\n        mov     #7, w5"
     trap = chance.choice((odd, f"{zero}\n        repeat  #17\n        div.u   w5, w4"))
     return f"\n        mov     _turns, w0\n        and     w0, #31, w0\n        bra     nz, 6f{trap}\n6:      nop"
 
 
 def _asks(chance: Chance, _n: int) -> str:
-    """Request an interrupt by software, or change a priority."""
+    """Return code that requests an interrupt by software, toggles NSTDIS or changes a priority."""
     return chance.choice(
         (
             f"\n        mov     #{chance.randrange(8) << 12 | 0x444:#x}, w0\n        mov     w0, IPC0",
@@ -226,7 +228,7 @@ def _asks(chance: Chance, _n: int) -> str:
 
 
 def _ends(chance: Chance, _n: int) -> str:
-    """Reset the chip or stop permanently after some rounds."""
+    """Return code that resets the chip or stops permanently after some rounds."""
     what = chance.choice(
         (
             "reset",

@@ -55,7 +55,7 @@ def test_every_page_is_reached_from_home_in_three_clicks(site: Path) -> None:
 
 @pytest.mark.slow
 def test_pages_name_their_files_relative_to_themselves(site: Path) -> None:
-    """So the site works from disk and in any folder of a server."""
+    """Relative names make the site work from disk and in any folder of a server."""
     pages = {page: page.read_text(encoding="utf-8") for page in site.rglob("*.html")}
     assert [page for page, text in pages.items() if re.search(r'(href|src)="/', text)] == []
 

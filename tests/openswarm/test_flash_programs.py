@@ -145,7 +145,7 @@ def test_a_robot_takes_it_whatever_is_lost_and_however_late_it_speaks():
         assert neighbour.counts.resets == 0
 
 
-def test_a_line_that_echoes_is_told_and_nothing_believed():
+def test_a_line_that_echoes_is_reported_and_not_trusted():
     """A line that echoes is refused: the host's own advertisement would pass for that of a robot that has the
     program."""
 
@@ -258,7 +258,7 @@ def image(version: int | None, *blocks: tuple[int, list[int]], chip: str = "dsPI
     return Image("test.elf", "elf", chip_named(chip), made, raw_symbols=tuple(symbols))
 
 
-def test_what_is_no_program_is_told():
+def test_what_is_no_program_is_reported():
     start = (SLOT.start, [0] * 3)
     made = program_of(image(1, start))
     assert (made.version, len(made.rows), len(made.rows[0])) == (1, 1, ROW_BYTES)

@@ -80,8 +80,8 @@ def test_a_body_at_no_finite_place_hides_no_other() -> None:
         assert seen == OBJECT or any(map(math.isnan, poses.values))
 
 
-def test_a_look_within_a_quantum_is_made_from_the_extrapolated_pose() -> None:
-    """A look between two poses is made from the pose between them."""
+def test_a_look_within_a_quantum_uses_the_interpolated_pose() -> None:
+    """A look between two quanta uses the pose interpolated between the last two."""
     scene = load_scene("clustering").with_values(robots__count=1, objects__count=1)
     turned, object_at = math.radians(15), [(150.0, 100.0)]
     before, now = Poses([(80.0, 100.0, -turned)], object_at), Poses([(100.0, 100.0, turned)], object_at)

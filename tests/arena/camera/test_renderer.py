@@ -88,7 +88,7 @@ def test_vignetting_darkens_the_corners_by_its_share(scene: Scene) -> None:
 
 
 def test_a_near_body_hides_a_far_one_up_to_its_height(scene: Scene) -> None:
-    """A robot of 55 mm stands before an object of 100 mm: the object is visible above the robot, and the room above
+    """A robot of 55 mm is before an object of 100 mm: the object is visible above the robot, and the room above
     the wall."""
     poses = Poses([ROBOT_AT, (LENS_X + 50, 150, 0.0)], [(LENS_X + 80, 150)])
     rows = (0, 190, 200, 240, 265, 400)

@@ -170,7 +170,7 @@ def test_a_cycle_has_one_state(tmp_path: Path) -> None:
 
 
 def test_the_world_goes_back_with_a_kilobot(tmp_path: Path) -> None:
-    """Breakpoint, call stack, values, `finish`, the way back, and a change that a move before its time undoes."""
+    """Breakpoint, call stack, values, `finish`, a rewind, and a change that a move to an earlier time undoes."""
     plan = plan_of(crowd("gradient", 3), 1.5)
     session = DebugSession(plan, 1, tmp_path, is_recorded=False)
     try:
@@ -220,17 +220,17 @@ def play(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.Capture
         monkeypatch.setattr("sys.stdin", io.StringIO("\n".join(lines)))
         words = [str(tmp_path / "scene.toml"), "--minutes", "0.01", "--seed", "3"]
         status = main(["debug", *words, "--robot", "0", "--tui", "--out", str(tmp_path / "debugged")])
-        told = capsys.readouterr()
+        printed = capsys.readouterr()
         assert main(["run", *words, "--trials", "1", "--jobs", "1", "--out", str(tmp_path / "alone")]) == 1
         records = [(tmp_path / name / "trial-0001.parquet").read_bytes() for name in ("debugged", "alone")]
         assert records[0] == records[1]
-        return status, told.out, told.err
+        return status, printed.out, printed.err
 
     return one
 
 
 def test_a_fault_stops_the_debugger_and_the_robot(faulty: Path, play: Play) -> None:
-    """A fault is a stop with its cause; the way back works; then the robot stands and the others continue."""
+    """A fault stops with its cause; a rewind works; then the robot stays halted and the others continue."""
     group = '[[robots]]\nkind = "kilobot"\nimage = "{}"\nplace = "poses"\nposes = [[{}, 100]]\n'
     status, output, error = play(group.format("faulty.elf", 100) + group.format("gradient", 105),
         "watch rounds if rounds == 4", "continue", "print rounds", "delete 1", "continue", "reverse-stepi",

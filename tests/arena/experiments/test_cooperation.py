@@ -70,7 +70,7 @@ def test_clocks_are_compared_with_the_arenas_time() -> None:
 
 
 def trial(tmp_path: Path, scene: str, seconds: float, *words: str, fewer: int = 2) -> Trial:
-    """Run a short trial near each other of all robots but `fewer`; no robot is switched off."""
+    """Run a short trial of a scene with `fewer` robots less, closer to each other, none of them switched off."""
     text = (Path(__file__).parents[3] / "arena" / "scenes" / f"{scene}.toml").read_text()
     lines = [line for line in text.splitlines() if not line.startswith("off =")]
     path = tmp_path / f"{scene}.toml"

@@ -93,7 +93,7 @@ def test_a_follower_gets_the_samples_of_the_finished_file_piece_by_piece(
     assert first["objects"] + rest["objects"] == whole["objects"]
 
 
-def test_a_run_that_is_ended_is_told(tmp_path: Path, recorded: tuple[dict[str, Any], list[dict[str, Any]]]) -> None:
+def test_a_run_that_is_ended_is_reported(tmp_path: Path, recorded: tuple[dict[str, Any], list[dict[str, Any]]]) -> None:
     """The state is aborted when the live file disappears and there is no record."""
     about, rows = recorded
     live = LiveFile(live_path(tmp_path, 1), about)

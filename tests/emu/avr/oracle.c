@@ -19,7 +19,7 @@ struct pair {
     run_function run;
     decode_function decode;
     u64 random;
-    char told[400]; /* the first difference */
+    char difference[400]; /* the first difference */
 };
 
 static u32 draw(struct pair *p)
@@ -54,9 +54,9 @@ void pair_close(struct pair *p)
     free(p);
 }
 
-const char *pair_told(const struct pair *p)
+const char *pair_difference(const struct pair *p)
 {
-    return p->told;
+    return p->difference;
 }
 
 static u32 sreg_of(const avr_t *avr)
@@ -93,7 +93,7 @@ static int differ(struct pair *p, u32 word, u64 step, u64 theirs, u64 ours)
         what = "SP";
     if (what == NULL)
         return 0;
-    snprintf(p->told, sizeof p->told,
+    snprintf(p->difference, sizeof p->difference,
              "%s after step %llu, word %04x: simavr pc %04x cycles %llu SREG %02x r%u=%02x, emulator pc %04x cycles"
              " %llu SREG %02x r%u=%02x fault %u",
              what, (unsigned long long)step, word, a->pc, (unsigned long long)theirs, sreg_of(a), at ? at - 1 : 0,
@@ -107,7 +107,8 @@ static int memories_differ(struct pair *p, u32 word, u64 step)
     const u8 *theirs = p->theirs->data + RAM_START, *ours = p->ours->data + RAM_START;
     for (u32 at = 0; at < DATA_BYTES - RAM_START; at++)
         if (theirs[at] != ours[at]) {
-            snprintf(p->told, sizeof p->told, "RAM %04x after step %llu, word %04x: simavr %02x, emulator %02x",
+            snprintf(p->difference, sizeof p->difference,
+                     "RAM %04x after step %llu, word %04x: simavr %02x, emulator %02x",
                      at + RAM_START, (unsigned long long)step, word, theirs[at], ours[at]);
             return 1;
         }

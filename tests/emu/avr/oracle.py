@@ -34,7 +34,7 @@ def library() -> ctypes.CDLL:
     handle = ctypes.c_void_p
     loaded.pair_open.restype, loaded.pair_open.argtypes = handle, [handle] * 4
     loaded.pair_close.argtypes = [handle]
-    loaded.pair_told.restype, loaded.pair_told.argtypes = ctypes.c_char_p, [handle]
+    loaded.pair_difference.restype, loaded.pair_difference.argtypes = ctypes.c_char_p, [handle]
     loaded.pair_load.argtypes = [handle, ctypes.c_char_p, ctypes.c_int64]
     loaded.pair_row.restype = loaded.pair_lockstep.restype = ctypes.c_int64
     loaded.pair_row.argtypes = [handle, ctypes.POINTER(ctypes.c_uint16), ctypes.c_int64, ctypes.c_int64,
@@ -64,7 +64,7 @@ class Pair:
         words = legal_words(row)
         listed = (ctypes.c_uint16 * len(words))(*words)
         done = self._library.pair_row(self._handle, listed, len(words), tries, seed)
-        return "" if done == tries else f"{row.syntax}: {self.told}"
+        return "" if done == tries else f"{row.syntax}: {self.difference}"
 
     def load(self, flash: bytes) -> None:
         """Load a program into both."""
@@ -72,12 +72,12 @@ class Pair:
 
     def lockstep(self, steps: int) -> str:
         """Execute instructions in both. Return a description of the first difference, or ""."""
-        return "" if self._library.pair_lockstep(self._handle, steps) == steps else self.told
+        return "" if self._library.pair_lockstep(self._handle, steps) == steps else self.difference
 
     @property
-    def told(self) -> str:
+    def difference(self) -> str:
         """Return the first difference."""
-        return str(self._library.pair_told(self._handle).decode())
+        return str(self._library.pair_difference(self._handle).decode())
 
     def close(self) -> None:
         """End simavr."""

@@ -52,8 +52,8 @@ def script(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) 
     def run(image: AvrImage, *commands: str, options: tuple[str, ...] = ()) -> tuple[int, list[str], str]:
         monkeypatch.setattr("sys.stdin", io.StringIO("\n".join(commands) + "\n"))
         status = main(["debug", "--tui", image.path, "--board", "kilobot", *options])
-        told = capsys.readouterr()
-        return status, told.out.splitlines(), told.err
+        printed = capsys.readouterr()
+        return status, printed.out.splitlines(), printed.err
 
     return run
 

@@ -54,7 +54,7 @@ def test_all_words_are_disassembled_as_by_binutils(tmp_path: Path) -> None:
 
 
 def test_targets() -> None:
-    """Branches, jumps and calls name their target; loads do not."""
+    """`target` returns the target of branches, jumps and calls, and None for loads."""
     assert target(0xCFFF, 0, 0x100) == 0x100  # rjmp .-2
     assert target(0xF7F1, 0, 0x100) == 0xFE  # brne .-4
     assert target(0x940E, 0x0123, 0) == 0x246  # call
@@ -71,5 +71,5 @@ def test_erased_flash_is_executed() -> None:
 
 def test_every_row_computes_as_simavr(pair: Pair) -> None:
     """300 random cases of every row leave the same registers, SREG, RAM, PC and cycles; new ones per commit."""
-    found = [told for row in compared_rows() if (told := pair.row(row, 300, base_seed()))]
+    found = [difference for row in compared_rows() if (difference := pair.row(row, 300, base_seed()))]
     assert found == []

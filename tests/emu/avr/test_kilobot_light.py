@@ -88,7 +88,7 @@ def test_light_ends_with_its_robot(build: Build) -> None:
 
 
 def test_three_hundred_pulses_at_the_same_time(build: Build) -> None:
-    """Robots with equal clocks that all hear all send at the same tick; each receives the light once."""
+    """Robots with equal clocks send at the same tick; each hears all others and receives the light once."""
     image = build(COUNTER)
     swarm = KilobotSwarm([KilobotSetup(image, x=n % 20, y=n // 20) for n in range(300)], delay=200)
     for robot in swarm.robots:

@@ -29,29 +29,29 @@ def test_cycles_by_function_and_line(build: Build, capsys: pytest.CaptureFixture
     """A function of 7 cycles that runs 1,000 times has 7,000; functions, lines and idle time add up."""
     image = build(LOOP, "-Os", "-g")
     assert main(["profile", image.path, "--board", "kilobot", "--seconds", "0.1", "--json", "--ohc", "none"]) == 0
-    told = validated("emu", "profile", capsys.readouterr().out)
-    assert told["functions"]["count"]["cycles"] == 7_000
-    assert told["levels"] == {}
-    assert told["idle"]["cycles"] > 600_000
-    assert sum(one["cycles"] for one in told["functions"].values()) == told["busy"]["cycles"]
-    assert told["busy"]["cycles"] + told["idle"]["cycles"] == told["cycles"] >= 800_000
+    report = validated("emu", "profile", capsys.readouterr().out)
+    assert report["functions"]["count"]["cycles"] == 7_000
+    assert report["levels"] == {}
+    assert report["idle"]["cycles"] > 600_000
+    assert sum(one["cycles"] for one in report["functions"].values()) == report["busy"]["cycles"]
+    assert report["busy"]["cycles"] + report["idle"]["cycles"] == report["cycles"] >= 800_000
     (line,) = [number for number, text in enumerate(Path(image.path).with_name("program.c").read_text().splitlines(), 1)
                if "ISR(TIMER0" in text]  # fmt: skip
-    handler = told["functions"]["__vector_14"]["cycles"]
-    assert [one["cycles"] for name, one in told["lines"].items() if name.endswith(f"program.c:{line}")] == [handler]
+    handler = report["functions"]["__vector_14"]["cycles"]
+    assert [one["cycles"] for name, one in report["lines"].items() if name.endswith(f"program.c:{line}")] == [handler]
     assert handler % 399 == 0  # as many entries, each with 4 cycles and a jump of 3
     assert handler / 399 > 7
-    assert not [name for name in told["functions"] if name in ("__vectors", "__vector_default")]
+    assert not [name for name in report["functions"] if name in ("__vectors", "__vector_default")]
 
 
 def test_text_callgrind_and_refusals(build: Build, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """--lines prints lines, --callgrind writes them; options of the e-puck and unreadable files get one line."""
+    """--lines prints lines, --callgrind writes them. Options of the e-puck and unreadable files are refused."""
     image, file = build(LOOP, "-Os", "-g"), tmp_path / "out.callgrind"
     run = ["profile", image.path, "--board", "kilobot", "--seconds", "0.01"]
     assert main([*run, "--lines", "3", "--callgrind", str(file), "--group", "work=count"]) == 0
-    told = capsys.readouterr().out
-    assert "program.c:" in told
-    assert "work " in told
+    printed = capsys.readouterr().out
+    assert "program.c:" in printed
+    assert "work " in printed
     assert "fn=count" in file.read_text()
     assert main([*run, "--speedscope", str(file)]) == 2
     assert capsys.readouterr().err == "emu profile: --speedscope does not apply to --board kilobot\n"
@@ -64,9 +64,9 @@ def test_a_fault_ends_the_profile(build: Build, capsys: pytest.CaptureFixture[st
     """The counts up to the fault are printed, and the status is 1."""
     image = build("int main(void) { *(volatile uint8_t *)0x900 = 1; for (;;) ; }", "-Os", "-g")
     assert main(["profile", image.path, "--board", "kilobot", "--json"]) == 1
-    told = capsys.readouterr()
-    assert "behind the end of RAM" in told.err
-    assert json.loads(told.out)["fault"]["symbol"] == "main+0x2"
+    printed = capsys.readouterr()
+    assert "behind the end of RAM" in printed.err
+    assert json.loads(printed.out)["fault"]["symbol"] == "main+0x2"
 
 
 def test_an_observed_run_equals_another(build: Build) -> None:

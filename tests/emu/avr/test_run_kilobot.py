@@ -38,8 +38,8 @@ def test_reports(build: Build, capsys: pytest.CaptureFixture[str]) -> None:
     """LED, motors and UART are reported with their times; the run ends where the program sleeps forever."""
     image = build(BLINK)
     assert main(["run", image.path, "--board", "kilobot", "--ohc", "none"]) == 0
-    told = capsys.readouterr()
-    lines = [line.split(" ", 1) for line in told.out.splitlines()]
+    printed = capsys.readouterr()
+    lines = [line.split(" ", 1) for line in printed.out.splitlines()]
     assert [text for _, text in lines] == [
         "led red=3 green=0 blue=0",
         "led red=1 green=1 blue=0",
@@ -49,8 +49,8 @@ def test_reports(build: Build, capsys: pytest.CaptureFixture[str]) -> None:
     times = [float(at) for at, _ in lines]
     assert times == sorted(times)
     assert 0.0199 < times[2] < 0.0202
-    assert told.err.startswith("halt at 0x")
-    assert "(main+" in told.err
+    assert printed.err.startswith("halt at 0x")
+    assert "(main+" in printed.err
 
 
 RESETS = """
@@ -79,22 +79,22 @@ def test_json(build: Build, capsys: pytest.CaptureFixture[str]) -> None:
     """--json prints the same results as data, with reason and status of the limit that ended the run."""
     image = build(BLINK)
     assert main(["run", image.path, "--board", "kilobot", "--json", "--cycles", "100000", "--exit-code"]) == 124
-    told = validated("emu", "run-kilobot", capsys.readouterr().out)
-    assert (told["reason"], told["status"], told["engine"]) == ("limit", 124, "avr")
-    assert [led["red"] for led in told["led"]] == [3, 1]
-    assert told["cycles"] >= 100_000
-    assert told["motors"] == []
+    report = validated("emu", "run-kilobot", capsys.readouterr().out)
+    assert (report["reason"], report["status"], report["engine"]) == ("limit", 124, "avr")
+    assert [led["red"] for led in report["led"]] == [3, 1]
+    assert report["cycles"] >= 100_000
+    assert report["motors"] == []
 
 
 def test_a_fault_names_function_and_line(build: Build, capsys: pytest.CaptureFixture[str]) -> None:
     """A store beyond RAM ends the run with status 1 and the place of the instruction."""
     image = build(FAULT)
     assert main(["run", image.path, "--board", "kilobot"]) == 1
-    told = capsys.readouterr().err
-    assert "fault: store to 0x0900, behind the end of RAM at 0x8ff" in told
+    printed = capsys.readouterr().err
+    assert "fault: store to 0x0900, behind the end of RAM at 0x8ff" in printed
     line = (Path(image.path).with_name("program.c")).read_text().splitlines().index("    *at = 1;") + 1
-    assert "(spoil" in told
-    assert f"program.c:{line})" in told
+    assert "(spoil" in printed
+    assert f"program.c:{line})" in printed
 
 
 MISTAKES = {
@@ -112,10 +112,10 @@ def test_mistakes_are_named(build: Build, capsys: pytest.CaptureFixture[str], te
     """An interrupt without handler, a call of a wild pointer and a stack in the variables are named with a place."""
     image = build(MISTAKES[text])
     status = main(["run", image.path, "--board", "kilobot", "--ohc", "none", "--cycles", "200000"])
-    told = capsys.readouterr().err
-    assert text in told
+    printed = capsys.readouterr().err
+    assert text in printed
     assert status == (0 if "overflow" in text else 1)
-    assert "program.c:" in told
+    assert "program.c:" in printed
 
 
 def test_a_jump_to_the_start_is_reported(build: Build, capsys: pytest.CaptureFixture[str]) -> None:

@@ -122,7 +122,7 @@ def test_slow_camera_driver_captures_a_grey_picture(start):
 @pytest.mark.slow
 @pytest.mark.parametrize("source", ["agenda.c", "sound.c", "sercom.c", "slowcam.c"])
 def test_engines_agree_to_the_bit(start, source):
-    """engines.md §4.3: both engines reach the same state at the same cycle, after a frame of the remote control."""
+    """engines.md §4.3: after a frame of the remote control, both engines reach the same state at the same cycle."""
     states = []
     for engine in ("plain", "auto"):
         machine = start(source, engine, camera="PO3030K", seed=3)

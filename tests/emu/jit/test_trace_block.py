@@ -155,9 +155,8 @@ def test_whole_records_are_equal_wherever_a_run_stops(body: list[int]) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("at", range(START, START + 2 * len(BODIES["one behind the other"]), 2))
-def test_hooks_are_met_as_often(at: int) -> None:
-    """Hooks on a branch, on skipped instructions and after them are called as often, and in the same cycles, in both
-    engines."""
+def test_hooks_are_called_in_the_same_cycles(at: int) -> None:
+    """Both engines call hooks on a branch, on skipped instructions and after them in the same cycles."""
     arrivals: list[list[int]] = []
     machines = list(pair(firmware_of(BODIES["one behind the other"])))
     for machine in machines:

@@ -39,21 +39,21 @@ def driving(image: Build, kind: int) -> Machine:
     return machine
 
 
-def stands(machine: Machine) -> bool:
+def has_no_current(machine: Machine) -> bool:
     """Whether no coil has current: the outputs are low, or the pins are inputs after a reset."""
     return machine.peek("LATD") & PIN_MOTORS == 0 or machine.peek("TRISD") & PIN_MOTORS == PIN_MOTORS
 
 
-def until_it_stands(machine: Machine) -> int:
-    """Return the Tcy until the wheels stop, by an instruction or by the watchdog's reset."""
+def cycles_until_stop(machine: Machine) -> int:
+    """Run until the wheels stop, by an instruction or by the watchdog's reset; return the number of Tcy."""
     begin, resets = machine.cycle, len(machine.resets)
     for _ in range(4000):
         machine.step()
-        if stands(machine):
+        if has_no_current(machine):
             return machine.cycle - begin
     machine.stop_on_fault = False
     machine.run(cycles=2 * WATCHDOG_TCY, until=place(machine, "begin"))
-    assert len(machine.resets) == resets + 1, "the wheels turn on"
+    assert len(machine.resets) == resets + 1, "the wheels continue to turn"
     return machine.resets[-1][0] - begin
 
 
@@ -64,8 +64,8 @@ def table() -> dict[str, int]:
 
 
 @pytest.mark.slow
-def test_the_wheels_stand_within_the_documented_time(image: Build) -> None:
-    measured = {name: until_it_stands(driving(image, kind)) for kind, name in enumerate(KINDS)}
+def test_the_wheels_stop_within_the_documented_time(image: Build) -> None:
+    measured = {name: cycles_until_stop(driving(image, kind)) for kind, name in enumerate(KINDS)}
     documented = table()
     assert set(documented) == set(KINDS)
     assert {kind: tcy <= documented[kind] for kind, tcy in measured.items()} == dict.fromkeys(KINDS, True), measured
@@ -120,7 +120,7 @@ def test_the_watchdog_ends_in_the_safe_state(image: Build, kind: int) -> None:
     assert stop.reason == "fault", stop
     assert said.startswith(b"watchdog reset:128 in thread 0"), said
     assert machine.peek(machine.address_of("cause")) == RESET_WATCHDOG
-    assert stands(machine)
+    assert has_no_current(machine)
     assert machine.peek("LATA") & LED_RING == LED_RING
 
 

@@ -119,7 +119,7 @@ def test_a_call_takes_no_longer_than_its_contract(calls, call: str) -> None:
 
 @pytest.mark.parametrize("header", sorted(path.name for path in HEADERS.glob("openswarm*.h")))
 def test_every_call_has_a_contract_line(header: str) -> None:
-    """Each call of a public header states who may make it; each of no option also its cycles and its stack."""
+    """Each call of a public header states who may make it; outside of options, also its cycles and its stack."""
     declared = set(CALL.findall((HEADERS / header).read_text())) - NO_CALLS
     assert declared == set(callers(header))
     if header.removesuffix(".h").partition("_")[2] in {"", *OTHERS}:

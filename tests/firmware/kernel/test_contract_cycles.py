@@ -155,7 +155,7 @@ LIKE = {
 """For each call: its contract text, another call, and the greatest difference of their bounds."""
 SHARE_TEXT = "2120 + 405 b + 2 g; at most 460 more while memory is short"
 START_UP = "-"
-"""Cycles field of the calls of main that start or retire it, each made once, and of TRANSFERS."""
+"""Cycles field of TRANSFERS and of calls that main makes once, to start the system or to end its own part."""
 DEVICES = ("analog", "battery", "bluetooth", "camera", "i2c", "led", "remote", "spi")
 """Folders of io/ whose header of the same name is for applications."""
 OTHER_DEVICES = {
@@ -180,7 +180,7 @@ def checked_calls() -> set[str]:
 
 
 def test_the_cycles_of_every_call_are_checked() -> None:
-    """Each call of a public header has cycles that a test checks, except those of main that start or retire it."""
+    """Each call of a public header has cycles that a test checks, except those marked START_UP."""
     declared, start_up = set(), set()
     for header in headers():
         text = (HEADERS / header).read_text()
@@ -285,13 +285,13 @@ def test_a_contract_covers_the_bound_of_the_own_path(image: Build, call: str) ->
 
 
 def return_address(machine: emu.Machine) -> int:
-    """Return where the function returns whose first instruction is next."""
+    """Return the return address of the function whose first instruction is next."""
     top = machine.w[15]
     return (machine.peek(top - 4) | (machine.peek(top - 2) & 0x7F) << 16) & ~1
 
 
 def record_calls(machine: emu.Machine, function: str) -> list[tuple[int, int]]:
-    """Return a list to which each call of a function from now on adds the cycles of its begin and its end."""
+    """Return a list to which each call of a function from now on adds the cycles of its begin and end."""
     spans: list[tuple[int, int]] = []
 
     def enter() -> None:

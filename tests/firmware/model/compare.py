@@ -115,7 +115,7 @@ class Kernels:
         return any(self.check([program]))
 
     def shrunk(self, program: Program) -> Program:
-        """Return a smaller program that differs, too, in which no operation can be removed or simplified."""
+        """Return a smaller program whose records still differ; no operation can be removed or simplified further."""
         again = True
         while again:
             again = False

@@ -150,8 +150,8 @@ class CpuInQemu(Comparison):
 class KilobotCpu(Comparison):
     """The Kilobot's CPU in simavr, which starts once per program. Raises NotInstalled.
 
-    Not compared are programs with cleanups, whose script runs on the stack of another script, and those that its 2 kB
-    of RAM cannot hold.
+    Two kinds of programs are not compared: those with cleanups, whose script runs on the stack of another script, and
+    those that its 2 kB of RAM cannot hold.
     """
 
     heap = HEAP_OF_KILOBOT

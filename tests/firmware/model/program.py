@@ -64,7 +64,7 @@ class Program:
 
     @staticmethod
     def parse(text: str) -> Program:
-        """Return the program of which `text` is the text."""
+        """Return the program that `text` describes."""
         program = Program()
         for line in text.strip().splitlines():
             head, _, calls = line.strip().partition(":")

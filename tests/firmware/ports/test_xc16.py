@@ -97,7 +97,7 @@ def test_it_builds_and_the_measuring_commands_find_their_symbols(stand_in: Path,
     assert "kernel stack" in capsys.readouterr().out
 
 
-def test_the_assembler_is_told_where_interrupt_entries_are() -> None:
+def test_the_assembler_is_given_the_folder_of_interrupt_entries() -> None:
     """The assembler receives the include path of isr.inc, which openswarm_interrupt.h includes in assembly within C.
 
     A GCC of XC16's version does not pass -I on to its assembler.

@@ -115,7 +115,7 @@ def test_a_robot_takes_checks_and_runs_what_the_host_has(robot, programs):
 
 
 @pytest.mark.slow
-def test_a_robot_that_falls_silent_is_told(robot, programs):
+def test_a_robot_that_falls_silent_is_reported(robot, programs):
     """The host reports a robot that does not answer, and one that receives nothing after it has requested rows.
 
     First no message of the host arrives; then the robot is cut off as soon as it requests rows.

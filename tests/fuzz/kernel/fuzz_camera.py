@@ -2,7 +2,7 @@
 T]`.
 
 A sample of this campaign is tests/firmware/camera/test_camera_on_target.py. A round executes every kernel and device
-call with all interrupts on, without (even seeds) or with IPL slip, and moves the HREF edge over all cycles: about
+call with all interrupts enabled, with IPL slip if the seed is odd, and moves the HREF edge over all cycles: about
 25,000 lines, each of which must be captured without a wrong byte. With --stride a round tests every N-th cycle, from
 a first one that depends on its seed.
 """

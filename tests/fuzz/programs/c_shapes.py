@@ -282,7 +282,7 @@ class Program:
         return [f"{name}[{self.index(s, n)}] = {self.expression(t, s, 2)};"]
 
     def _select(self, s: Scope, depth: int, calls: list[Signature]) -> list[str]:
-        """Assign the address of one of several arrays, selected by a condition, to a pointer."""
+        """Return statements that set a pointer to one of several arrays, selected by a condition."""
         if not s.pointers:
             return []
         name, t, n = self.rng.choice(s.pointers)
@@ -298,7 +298,7 @@ class Program:
         return [f"{name} = {value};"]
 
     def _escape(self, s: Scope, depth: int, calls: list[Signature]) -> list[str]:
-        """Pass the address of a local variable to another file, which writes through it."""
+        """Return statements that pass the address of a local variable to another file, which writes through it."""
         choice = [(a, t, n) for a, t, n in s.arrays if t in ("u8", "u16", "i32")] + [
             (f"&{name}", t, 1) for name, t in s.scalars if t in ("u8", "u16", "i32") and name[0] == "v"
         ]
@@ -309,7 +309,7 @@ class Program:
         return lines[: self.rng.choice((1, 2, 2))]
 
     def _struct(self, s: Scope, depth: int, calls: list[Signature]) -> list[str]:
-        """Copy structs."""
+        """Return a statement that copies a struct."""
         places = s.structs + self.globals.structs
         name, kind = self.rng.choice(places)
         same = [other for other, k in places if k == kind and other != name]
@@ -327,7 +327,7 @@ class Program:
         return [f"{name}.{plain} = {self.expression(t, s, 2)};"]
 
     def _port(self, s: Scope, depth: int, calls: list[Signature]) -> list[str]:
-        """Access volatile registers in a fixed order."""
+        """Return statements that access volatile registers; the compiler must keep their order."""
         out = []
         for _ in range(self.rng.choice((1, 1, 2, 3))):
             out.append(self._access(s))
@@ -408,7 +408,7 @@ class Program:
         return [f"{name} = ({t}){text};"]
 
     def _memory(self, s: Scope, depth: int, calls: list[Signature]) -> list[str]:
-        """Call memset and memcpy on whole arrays and on parts."""
+        """Return a call of memset or memcpy on a whole array or a part."""
         name, t, n = self.rng.choice(s.arrays + self.globals.arrays)
         size = BITS[t] // 8
         same = [(a, m) for a, kind, m in s.arrays + self.globals.arrays if kind == t and a != name]
@@ -421,7 +421,7 @@ class Program:
         return [f"mix({self.expression('u32', s, 2)});"]
 
     def _feature(self, s: Scope, depth: int, calls: list[Signature]) -> list[str]:
-        """Use a construct of `c_features.py`; in interrupt functions only those that are reentrant."""
+        """Return statements that use a construct of `c_features.py`; none in interrupt functions."""
         if s.quiet:
             return []
         name = self.fresh("r")
@@ -429,7 +429,7 @@ class Program:
         return [f"{{   u32 {name} = 1;", *(f"    {line}" for line in lines), f"    mix({name});", "}"]
 
     def _sized(self, s: Scope, depth: int, calls: list[Signature]) -> list[str]:
-        """Use an array of computed length or alloca, so that W14 is the frame pointer."""
+        """Return statements with an array of computed length or alloca, so that W14 is the frame pointer."""
         if not s.port and not s.pointers:
             return []  # keeps the frames of interrupt functions and of start() small
         name, n, k, t = self.fresh("q"), self.fresh("n"), self.fresh("k"), self.pick(("u8", "u16", "i32"))
@@ -548,7 +548,7 @@ class Program:
         }
 
     def _keepers(self) -> str:
-        """Define functions that keep the address of a caller's local variable for a while and write through it."""
+        """Return functions that keep the address of a caller's local variable for a while and write through it."""
         out = []
         for t in ("u8", "u16", "i32"):
             out.append(

@@ -3,9 +3,9 @@
 Usage: `python tests/fuzz/swarm/fuzz_rewind.py [--walks N] [--seed N] [--seconds S]`. A sample of this campaign is
 tests/arena/debug/test_rewind.py. A walk debugs one robot of a trial whose robots push objects, avoid each other by
 infrared, or exchange messages. It steps, continues and rewinds to breakpoints, last writes and earlier times.
-Whenever a time is reached again, the world (bodies with their speeds, whole state of all robots) must be equal; of a
-crowd of Kilobots, time, and place and whole state of the debugged one. After the debugger detaches, the record must
-equal, byte for byte, that of a trial without a debugger.
+Whenever a time is reached again, the world (bodies with their speeds, whole state of all robots) must be equal; in a
+crowd of Kilobots, the time and the place and whole state of the debugged one must be. After the debugger detaches, the
+record must equal, byte for byte, that of a trial without a debugger.
 """
 
 from __future__ import annotations

@@ -292,9 +292,9 @@ def floor_product(x: Term, m: int, bits: int) -> Term:
 
 
 def test_upper_half() -> None:
-    """The sum of four word products has the upper half that the rules use.
+    """The upper half of the sum of four word products is the one that the rules compute.
 
-    The middle products count 2^16 times, the top one 2^32 times.
+    The two middle products have the weight 2^16, the top one 2^32.
     """
     lowest, one, other, top = z3.Ints("lowest one other top")
     solver = z3.Solver()

@@ -41,7 +41,7 @@ class CountedInterpreter:
 
 
 class CountingTranslator(Translator):
-    """Translator of exact code that counts instructions in `advance`, which it calls once per instruction."""
+    """Translator whose exact code counts the executed instructions; `advance` is called once per instruction."""
 
     def advance(self, pc: int, cycles: Number, mask: int, times: int = 1) -> None:
         super().advance(pc, cycles, mask, times)

@@ -139,8 +139,7 @@ def mode_words(generator: random.Random, chip: Chip = DSPIC30F6014A) -> list[int
 
 
 def core_words(generator: random.Random, chip: Chip = DSPIC30F6014A) -> list[int]:
-    """Return an access to a register that controls execution, to be placed at the end of a DO loop, under REPEAT or
-    elsewhere."""
+    """Return code that accesses a register that controls execution: at the end of a DO loop, under REPEAT, or alone."""
     name = generator.choice(("DCOUNT", "DCOUNT", "RCOUNT", "SR", "CORCON", "DOSTARTL", "DOENDL"))
     address = chip.sfrs[name].address
     one = generator.choice((

@@ -217,7 +217,7 @@ class Writer:
         return [f"add {self.data()}, {self.data()}, {self.data()}"]
 
     def nap(self) -> list[str]:
-        """Idle until timer 1 matches; rarely Sleep until an external INT0 edge."""
+        """Return code that enters Idle until timer 1 matches, rarely Sleep until an external INT0 edge."""
         wake = [f"mov #{self.draw.choice((3, 20, 60, 150))}, w0", f"mov w0, {self.at('PR1')}",
                 f"bclr {self.at('PMD1')}, #11", "mov #0x8000, w0", f"mov w0, {self.at('T1CON')}"]  # fmt: skip
         sources = {source.name: source for source in self.chip.interrupts.values()}
@@ -240,7 +240,7 @@ class Writer:
         return self.written(SCENES[self.draw.choice(sorted(SCENES))](self.draw))
 
     def written(self, settings: list[tuple[str, int]]) -> list[str]:
-        """Write registers and values in order; registers that the chip lacks are omitted."""
+        """Return code that writes values to registers in order; registers that the chip lacks are omitted."""
         lines = []
         for name, value in settings:
             if name in self.chip.sfrs:

@@ -277,7 +277,7 @@ static void no_tick_is_lost_while_lists_change(void)
 }
 
 /* Events exhaust the memory: the failure is reported and all memory is freed afterwards. */
-static void exhaustion_is_told(void)
+static void exhaustion_is_reported(void)
 {
     uint16 heap = heap_now(), made = 0;
     while (made < 8000 && Sys_Register_Event((uint16)(1000 + made))) {
@@ -323,5 +323,5 @@ void check_events(void)
     an_event_may_end_in_its_handler();
     a_handler_that_resends_starves_nobody();
     no_tick_is_lost_while_lists_change();
-    exhaustion_is_told();
+    exhaustion_is_reported();
 }
