@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Callable, Mapping, Sequence
 from itertools import pairwise
@@ -115,9 +114,13 @@ def check_limits(errors: TableErrors, name: str, table: Any, number: int | None 
     """Check the numbers of a table against `limits.LIMITS`. Raises SceneError."""
     for key, (low, high) in LIMITS[type(table)].items():
         value = getattr(table, key)
-        is_omitted = math.isnan(value) and math.isnan(getattr(type(table)(), key))
-        if not low <= value <= high and not is_omitted:
+        if not low <= value <= high and not (_is_nan(value) and _is_nan(getattr(type(table)(), key))):
             raise errors.at(name, key, f"{name}.{key} is {value}; expected {low} to {high}", number)
+
+
+def _is_nan(value: float) -> bool:
+    """Whether a number is nan. `math.isnan` raises an exception for integers beyond the range of float."""
+    return value != value
 
 
 def check_key(errors: TableErrors, table: str, key: str, number: int | None = None) -> None:

@@ -282,6 +282,7 @@ def test_five_hundred_mutated_scenes_are_read_or_refused_in_one_line(tmp_path: P
     path = tmp_path / "my.toml"
     pieces = [
         "-1", "1e999", "nan", "[[]]", "{}", '"x"', "[[robots]]", "=", "\x00", "é", "true", "[0, 0]", "99999999999",
+        "9" * 400,
     ]  # fmt: skip
     refused = 0
     for seed in range(500):
@@ -342,3 +343,20 @@ def test_a_scripted_trial_runs_in_a_furnished_scene(tmp_path: Path) -> None:
         0.0,
         0.0,
     )
+
+
+@pytest.mark.parametrize(
+    ("table", "key", "words"),
+    [
+        ("[arena]", "width_cm", "the number is too large"),
+        ("[start]", "selector", "expected "),
+        ("[[robots]]", "selector", "expected "),
+        ("[objects]", "count", "expected 0 to "),
+    ],
+)
+def test_integers_beyond_the_range_of_float_are_refused(table: str, key: str, words: str, tmp_path: Path) -> None:
+    """An integer of 400 digits is refused in every key; float and `math.isnan` cannot represent it."""
+    path = tmp_path / "my.toml"
+    path.write_text(f'name = "large"\n{table}\n{key} = {"9" * 400}\n')
+    with pytest.raises(SceneError, match=words):
+        load_scene(str(path))
