@@ -8,6 +8,7 @@ resumes with the `--seed` of its last output line.
 from __future__ import annotations
 
 import argparse
+import os
 import subprocess
 import sys
 import time
@@ -20,8 +21,16 @@ SKIPPED = 77
 """Exit status of a campaign that cannot run because a program it needs is not installed."""
 REPORT_EVERY = 30.0
 """Seconds between two progress lines on standard error."""
+STATM = Path("/proc/self/statm")
 WITHOUT_COMMIT = 1
 """First seed for a source tree without a git history."""
+
+
+def resident_bytes() -> int:
+    """Return the resident memory of this process in bytes; 0 on systems other than Linux."""
+    if not STATM.exists():
+        return 0
+    return int(STATM.read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
 
 
 @cache
