@@ -48,7 +48,7 @@ POWER = re.compile(r"\d+(?:\.\d+)?e-\d+")
 """A number that a browser would break after its minus sign."""
 BLOCK = re.compile(r'<div class="([^"]*\bhighlight\b[^"]*)"(>.*?</div>)', re.DOTALL)
 COLUMN_BLOCK = re.compile(r'(<div class="[^"]*\bcolumns\b[^"]*")(.*?<code>)(.*?)(</code>)', re.DOTALL)
-ENTRY = re.compile(r"^( {0,8}\S+(?: \S+)*)( )( +)(?=[^\W\d]|[`<&])")
+ENTRY = re.compile(r"^( {9,})?( {0,8}\S+(?: \S+)*)( )( +)(?=[^\W\d]|[`<&])")
 """A name and the gap before its description, in a list of files or commands."""
 CONTINUED = re.compile(r"^( {9,})(?=\S)")
 SENTENCE = re.compile(r"^(\$ .*|(?!.*\S {2,}\S).+)$", re.MULTILINE)
@@ -148,7 +148,8 @@ def _as_rows(block: re.Match[str]) -> str:
     plain = [html.unescape(re.sub("<[^>]+>", "", line)) for line in lines if line.strip()]
     if any(line.startswith("$") for line in plain):
         return opening + middle + SENTENCE.sub(r'<span class="sentence">\1</span>', code) + closing
-    entries = [bool(ENTRY.match(line)) for line in plain if not CONTINUED.match(line) and not line.endswith("/\n")]
+    found = [(ENTRY.match(line), CONTINUED.match(line)) for line in plain if not line.endswith("/\n")]
+    entries = [bool(entry) for entry, continued in found if entry or not continued]
     if sum(entries) < 0.6 * len(entries) or any(" && " in line for line in plain):
         return block[0]  # a table of numbers, or commands
     rows = "".join(f'<span class="row">{_as_row(line)}</span>' for line in lines)
@@ -157,7 +158,7 @@ def _as_rows(block: re.Match[str]) -> str:
 
 def _as_row(line: str) -> str:
     """Return a line of a list with its name and its gap as elements; the first space of a gap is no part of it."""
-    named = ENTRY.sub(r'<span class="name">\1</span>\2<span class="gap">\3</span>', line)
+    named = ENTRY.sub(r'\1<span class="name">\2</span>\3<span class="gap">\4</span>', line)
     return CONTINUED.sub(r'<span class="gap">\1</span>', named)
 
 

@@ -16,6 +16,7 @@ FILES = """elf/
   model.py        ObjectFile, Executable, Section
   archive.py      static libraries with a symbol index
                   and their members
+                  fields.py     relocated fields
 """
 
 
@@ -45,9 +46,9 @@ def test_a_list_of_files_has_rows_names_and_gaps(site_tool: ModuleType) -> None:
     """Each line is a row; its text is unchanged, so that copies and wide screens keep the columns."""
     page = site_tool.with_rows(BLOCK.format(FILES))
     assert 'class="columns highlight listing"' in page
-    assert page.count('class="row"') == 4
-    assert re.findall(r'class="name">(.*?)<', page) == ["  model.py", "  archive.py"]
-    assert [len(gap) for gap in re.findall(r'class="gap">( +)<', page)] == [7, 5, 18]
+    assert page.count('class="row"') == 5
+    assert re.findall(r'class="name">(.*?)<', page) == ["  model.py", "  archive.py", "fields.py"]
+    assert [len(gap) for gap in re.findall(r'class="gap">( +)<', page)] == [7, 5, 18, 18, 4]
     assert text_of(page) == FILES
 
 
