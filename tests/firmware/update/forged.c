@@ -256,6 +256,34 @@ static long spoil_frames(void)
     return frames * SYS_SPREAD_BYTES * 8;
 }
 
+/* Replays the advertisements of two newer programs in turn and answers with false data. Returns the number of transfers
+ * that the robot begins, each of which writes its flash. */
+static long wear_out(void)
+{
+    static const int newer[] = {10, NEW};
+    long begun_transfers = 0;
+    restore();
+    Sys_Start_Spreading(1);
+    failed = (sys_update){0, 0, 0};
+    for (int turn = 0; turn < 40; turn++) {
+        const sys_update *facts = &programs[newer[turn % 2]].facts;
+        uint8 both[2][SYS_SPREAD_BYTES];
+        prove(facts, false, both[0], both[1]);
+        Sys_Hear_Update(now, both[0]);
+        Sys_Hear_Update(now, both[1]);
+        begun_transfers += want.version != 0;
+        while (want.version != 0) {
+            for (uint8 part = 0; part < PARTS && want.version != 0; part++) {
+                uint8 m[SYS_SPREAD_BYTES] = {(uint8)(DATA | row), (uint8)(part << 3 | identity(facts) >> 8),
+                                             (uint8)identity(facts)};
+                Sys_Hear_Update(now, m);
+            }
+        }
+    }
+    check(begun_transfers >= MOST_FAILED && begun_transfers <= 2 * MOST_FAILED, "a forger wears the flash out");
+    return begun_transfers;
+}
+
 int main(void)
 {
     begin_history(false);
@@ -268,6 +296,6 @@ int main(void)
     long forgeries = forge(), keys = forge_keys(), replays = replay(), frames = spoil_frames();
     long advertisements = forge_advertisements();
     printf("%ld forgeries, %ld keys, %ld replays, %ld frames, ", forgeries, keys, replays, frames);
-    printf("%ld advertisements\n", advertisements);
+    printf("%ld advertisements, %ld spoiled\n", advertisements, wear_out());
     return 0;
 }

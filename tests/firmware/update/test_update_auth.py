@@ -60,13 +60,15 @@ def test_forged_and_replayed_programs_are_refused(tmp_path):
 
     CRCs are right. Also refused: every other number of rows, tags of keys with one other bit, a robot's erased key, and
     versions that the robot had before, although a transfer that never ended has erased the highest one. Advertisements
-    and their proofs are attacked in the same way; those that are not believed erase and activate nothing.
+    and their proofs are attacked in the same way; those that are not believed erase and activate nothing. A forger who
+    replays advertisements of two newer programs in turn, and sends false data, makes the robot begin four transfers.
     """
     said = on_host("forged", tmp_path, ATTACKED)
-    forgeries, keys, replays, frames, advertisements = (int(number) for number in re.findall(r"(\d+) \w", said))
+    forgeries, keys, replays, frames, advertisements, spoiled = map(int, re.findall(r"(\d+) \w", said))
     assert forgeries == 3 * ROW_BYTES * 8 + 24 + ROWS + 2
     assert (keys, replays) == (16 * 8 + 1, 10)
     assert advertisements == 2 * (2 * 64 + 16 * 8 + 1) + 4
+    assert spoiled == 4
     assert frames % 64 == 0
     assert frames > 3 * 20 * 64
 

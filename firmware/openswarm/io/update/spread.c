@@ -38,8 +38,8 @@ static sys_update have; /* stored program; version 0: none */
 static bool is_active;
 static sys_update want;   /* program being received; version 0: none */
 static sys_update vain;   /* program that `want` replaced, because no neighbour sent it */
-static sys_update failed; /* program that failed last */
-static uint8 failures;    /* number of its failures */
+static sys_update failed; /* program that failed last; with proofs, the highest version that failed */
+static uint8 failures;    /* number of its failures; with proofs, also of lower versions since */
 static uint8 row, asked, doublings, buffer[PARTS * PART];
 static bool is_asking, is_polite;
 static uint32 lacking; /* missing parts of `row`; bit n: part n */
@@ -163,9 +163,16 @@ static uint16 identity(const sys_update *facts)
     return (uint16)facts->crc & IDENTITY;
 }
 
+/* Whether failures of `failed` count against a program. A forger who spoils two proved programs in turn would otherwise
+ * wear the flash out; without proofs, a forged program must not count against a true one. */
+static bool is_suspect(const sys_update *their)
+{
+    return is_same(their, &failed) || (SYS_NEEDS_PROOFS && their->version < failed.version);
+}
+
 static bool is_newer(const sys_update *their)
 {
-    return their->version > have.version && (failures < MOST_FAILED || !is_same(their, &failed)) &&
+    return their->version > have.version && (failures < MOST_FAILED || !is_suspect(their)) &&
            ((their->version > want.version && !is_same(their, &vain)) ||
             (asked == MOST_ASKED && !is_same(their, &want)));
 }
@@ -281,8 +288,8 @@ static void on_data(const uint8 *m)
     if (is_put && Sys_End_Update()) {
         refresh();
     } else { /* the next advertisement begins it again if a store is usable */
-        failures = (uint8)(is_same(&want, &failed) ? failures + (failures != MOST_FAILED) : 1);
-        failed = want;
+        failures = (uint8)(is_suspect(&want) ? failures + (failures != MOST_FAILED) : 1);
+        failed = SYS_NEEDS_PROOFS && is_suspect(&want) ? failed : want;
     }
     want.version = vain.version = 0;
     begin_interval(SHORTEST);
