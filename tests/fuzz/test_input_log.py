@@ -72,9 +72,23 @@ def test_a_damaged_log_is_refused(line: bytes | str, tmp_path: Path) -> None:
 
 
 def test_the_table_counts_outcomes_of_each_kind() -> None:
-    failed = Block("scene", 10, 3, {FAILED: 1, "status 3": 2}, ["one"])
-    rows = table([block("scene", 0), failed], ["scene", "HEX"]).splitlines()[-3:]
-    assert rows == ["| scene | 13 | 4 | 6 | 2 | 1 |", "| HEX | 0 | 0 | 0 | 0 | 0 |", "| all | 13 | 4 | 6 | 2 | 1 |"]
+    other = Block("scene", 10, 3, {"done": 1, "status 3": 2}, ["one"])
+    rows = table([block("scene", 0), other], ["scene", "HEX"]).splitlines()[-3:]
+    assert rows == ["| scene | 13 | 5 | 6 | 2 |", "| HEX | 0 | 0 | 0 | 0 |", "| all | 13 | 5 | 6 | 2 |"]
+
+
+def test_a_block_with_a_failed_input_runs_again(tmp_path: Path) -> None:
+    """The process that has seen the failure continues behind the block; the next one repeats it, and it counts once."""
+    log = InputLog(tmp_path / "log")
+    log.add(Block("scene", 0, 10, {FAILED: 1, "done": 9}, ["one"]))
+    assert log.next_seed("scene", 0) == 10
+    log.add(block("scene", 10))
+    log.close()
+    log = InputLog(tmp_path / "log")
+    assert (log.next_seed("scene", 0), log.count("scene")) == (0, 10)
+    log.add(block("scene", 0))
+    log.close()
+    assert merged(input_log.passed(read_blocks(tmp_path / "log"))) == [block("scene", 0, 20, 8)]
 
 
 def test_the_page_shows_the_stored_log_and_no_failure() -> None:
@@ -97,7 +111,7 @@ def test_logs_of_two_hosts_are_merged(tmp_path: Path, monkeypatch: pytest.Monkey
     for _ in range(2):
         assert input_log.main() == 0
         assert read_blocks(tmp_path / "stored") == [block("scene", 0), block("scene", 1000)]
-    assert "| scene | 20 | 8 | 12 | 0 | 0 |" in (tmp_path / "table").read_text()
+    assert "| scene | 20 | 8 | 12 | 0 |" in (tmp_path / "table").read_text()
 
 
 @pytest.mark.slow
