@@ -33,8 +33,11 @@ def is_own_client(connection: socket.socket) -> bool:
     """
     if connection.family != socket.AF_INET:
         return True  # a Unix socket, to which only its owner can connect
+    try:
+        here, there = _endpoint(connection.getsockname()), _endpoint(connection.getpeername())
+    except OSError:
+        return False  # the client has reset the connection
     rows = _rows()
-    here, there = _endpoint(connection.getsockname()), _endpoint(connection.getpeername())
     if (here, there) not in rows:
         return True  # the list does not contain this process's sockets
     owner, is_open = rows.get((there, here), (ROOT_USER, False))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import socket
 import stat
+import struct
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -122,6 +123,24 @@ def test_a_client_that_has_gone_has_no_owner() -> None:
         client.close()
         with server.accept()[0] as connection:
             assert not is_own_client(connection)
+
+
+def reset(address: tuple[str, int]) -> None:
+    """Connect to a server, and reset the connection at once."""
+    with socket.create_connection(address, HANG) as client:
+        client.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+
+
+def test_a_client_that_resets_its_connection_ends_no_server() -> None:
+    """Servers refuse a connection that the client has reset before they accept it, and serve the next one."""
+    with listener(0) as server:
+        reset(server.getsockname())
+        with socket.create_connection(server.getsockname(), HANG) as client, accept(server, "name") as connection:
+            assert connection.getpeername() == client.getsockname()
+    with PageServer((LOOPBACK, 0), RequestHandler) as pages:
+        pages.timeout = HANG
+        reset((LOOPBACK, pages.server_port))
+        pages.handle_request()
 
 
 def test_without_a_list_of_sockets_local_clients_are_served(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
