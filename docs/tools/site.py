@@ -51,6 +51,8 @@ COLUMN_BLOCK = re.compile(r'(<div class="[^"]*\bcolumns\b[^"]*")(.*?<code>)(.*?)
 ENTRY = re.compile(r"^( {9,})?( {0,8}\S+(?: \S+)*)( )( +)(?=[^\W\d]|[`<&])")
 """A name and the gap before its description, in a list of files or commands."""
 CONTINUED = re.compile(r"^( {9,})(?=\S)")
+BESIDE = re.compile(r'( )( {2,})(?=(?:</span>)?(?:<span class="c|# ))')
+"""The gap between code and a comment on its right."""
 SENTENCE = re.compile(r"^(\$ .*|(?!.*\S {2,}\S).+)$", re.MULTILINE)
 """A line of a session that needs no columns: a command, or output without a gap."""
 LINE = 96
@@ -138,8 +140,13 @@ def _sized(block: re.Match[str]) -> str:
 
 def with_rows(text: str) -> str:
     """Return the HTML of a page whose lists of files and commands have an element for each line, name and gap, so that
-    narrow screens break their lines with a hanging indent."""
+    narrow screens break their lines with a hanging indent. Gaps before comments are elements, too."""
+    text = BLOCK.sub(_with_gaps, text)
     return COLUMN_BLOCK.sub(_as_rows, text)
+
+
+def _with_gaps(block: re.Match[str]) -> str:
+    return block[0] if "diagram" in block[1] else BESIDE.sub(r'\1<span class="gap">\2</span>', block[0])
 
 
 def _as_rows(block: re.Match[str]) -> str:

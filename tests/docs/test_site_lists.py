@@ -65,3 +65,11 @@ def test_a_session_breaks_lines_without_columns(site_tool: ModuleType) -> None:
     page = site_tool.with_rows(BLOCK.format(session))
     assert re.findall(r'class="sentence">(.*?)<', page) == ["$ size a.elf  b.elf", "limit at 0x38a after 3 s"]
     assert text_of(page) == session
+
+
+def test_a_comment_beside_code_has_a_gap(site_tool: ModuleType) -> None:
+    """The gap before a comment disappears on narrow screens, so that code and comment stay together."""
+    code = 'name = "a"<span class="w">     </span><span class="c1"># a comment</span>\nrun x    # another  one\n'
+    page = site_tool.with_rows(BLOCK.replace("columns ", "").format(code))
+    assert [len(gap) for gap in re.findall(r'class="gap">( +)<', page)] == [4, 3]
+    assert text_of(page) == text_of(code)
