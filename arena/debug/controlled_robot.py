@@ -75,7 +75,9 @@ class ControlledRobot:
             controller.control = self
         else:
             self._member = CrowdMember(controller.crowd, controller.index)
-            self.machine = cast("Machine", DebuggedKilobot(self._member))
+            kilobot = DebuggedKilobot(self._member)
+            controller.crowd.breakpoints.debug(controller.index, kilobot)
+            self.machine = cast("Machine", kilobot)
             controller.crowd.control = self
         self._trial: greenlet | None = None
         """Greenlet of the trial; None before the robot is switched on."""

@@ -55,7 +55,7 @@ class CrowdMember:
 
     def release(self) -> None:
         """Let the robot run as all others from now on."""
-        self._crowd.swarm.observe(self._index, None)
+        self._crowd.breakpoints.debug(self._index, None)
 
     def run_until(self, cycle: int) -> None:
         """As `Surroundings.run_until`. In the present, the robot does not run past the tick `end`."""
@@ -74,7 +74,7 @@ class CrowdMember:
         try:
             while True:
                 try:
-                    crowd.swarm.run_until(self.end)
+                    crowd.breakpoints.run_until(self.end)
                 except KilobotFaultError as fault:
                     if fault.robot == self._index:
                         raise

@@ -14,6 +14,7 @@ from typing import Final
 import numpy as np
 
 from arena.robots.controller import LedChange, Program, Reading, SerialLine, power_on_cycle
+from arena.robots.crowd_breakpoints import CrowdBreakpoints
 from arena.robots.robot_control import CrowdControl
 from arena.scene.checks import overhead_commands
 from arena.scene.loader import FCY, Scene, SceneError
@@ -81,6 +82,7 @@ class KilobotCrowd:
             machine.watch(registers)
         self.faults: Final[dict[int, str]] = {}
         """Faults of the firmware by the index of the robot."""
+        self.breakpoints: Final = CrowdBreakpoints(self.swarm)
         self.control: CrowdControl | None = None
         """Runs the robots in place of `run_until` while a debugger has one of them."""
         self._commands: Final = overhead_commands(setting.overhead)
@@ -129,7 +131,7 @@ class KilobotCrowd:
         """Run all robots to tick `end` (125 ns each); a robot whose firmware faults stops."""
         while True:
             try:
-                self.swarm.run_until(end)
+                self.breakpoints.run_until(end)
                 return
             except KilobotFaultError as fault:
                 self.switch_off(fault)

@@ -186,15 +186,20 @@ class TrialSession:
 
     def toggle_breakpoint(self, robot: int, place: str) -> None:
         """Set a breakpoint at a function of one robot, or delete it. The whole world pauses at a breakpoint."""
-        machine = self._firmware_controller(robot).machine
+        controller = self._controller_with_firmware(robot)
         key = robot, place
         if key in self._breakpoints:
             self._breakpoints.pop(key)()
             return
         try:
-            self._breakpoints[key] = machine.hook_pc(place, lambda *_: self._on_breakpoint(robot, place))
+            if isinstance(controller, KilobotController):
+                add = controller.crowd.breakpoints.add
+                remove = add(controller.index, place, lambda: self._on_breakpoint(robot, place))
+            else:
+                remove = controller.machine.hook_pc(place, lambda *_: self._on_breakpoint(robot, place))
         except (KeyError, ValueError) as error:
             raise CommandRefusedError(f"robot {robot}: {error.args[0]}") from None
+        self._breakpoints[key] = remove
 
     def debug(self, robot: int) -> None:
         """Attach a debugger to a robot, or detach it; `status` names the TCP port that serves one client.
@@ -208,7 +213,7 @@ class TrialSession:
         self._require_no_failure()
         if self._running.is_over:
             raise CommandRefusedError("the trial is over")
-        if self._controller_for_debugger(robot).has_stopped:
+        if self._controller_with_firmware(robot).has_stopped:
             raise CommandRefusedError(f"robot {robot}: its firmware has stopped; rewind first")
         self._discard_after(self._running.world.ticks)
         self._is_detach_requested = False
@@ -421,7 +426,9 @@ class TrialSession:
 
     def _on_breakpoint(self, robot: int, place: str) -> bool:
         """Execute commands while a robot is at a breakpoint, in the middle of a quantum, until `run` continues it."""
-        if self._replay or self._is_closed or self._firmware_controller(robot).machine.events.quiet:
+        controller = self._controller(robot)
+        is_past = isinstance(controller, FirmwareController) and controller.machine.events.quiet
+        if self._replay or self._is_closed or is_past:
             return False
         self._hit, self._is_held = f"robot {robot} is at {place}", True
         while self._is_held:
@@ -457,16 +464,9 @@ class TrialSession:
             raise CommandRefusedError(f"there is no robot {robot}")
         return self._running.controllers[robot]
 
-    def _controller_for_debugger(self, robot: int) -> FirmwareController | KilobotController:
+    def _controller_with_firmware(self, robot: int) -> FirmwareController | KilobotController:
         """Return the controller of a robot with firmware. Raises CommandRefusedError for another robot."""
         controller = self._controller(robot)
-        return controller if isinstance(controller, KilobotController) else self._firmware_controller(robot)
-
-    def _firmware_controller(self, robot: int) -> FirmwareController:
-        """Return the controller of an e-puck with firmware. Raises CommandRefusedError for another robot."""
-        controller = self._controller(robot)
-        if isinstance(controller, KilobotController):
-            raise CommandRefusedError(f"robot {robot} is a kilobot: attach a debugger for breakpoints")
-        if not isinstance(controller, FirmwareController):
+        if not isinstance(controller, FirmwareController | KilobotController):
             raise CommandRefusedError(f"robot {robot} is scripted: it has no firmware")
         return controller

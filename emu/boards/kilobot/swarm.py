@@ -165,7 +165,7 @@ class KilobotSwarm:
         """Positions of the centres in mm; `move` and `move_all` change them."""
         self.now = 0
         """Ticks of 125 ns since the start."""
-        self._observed: tuple[int, Observation | None] = (0, None)
+        self._observed: dict[int, Observation] = {}
         self._functions = _code()
         programs: dict[bytes, Program] = {}
         self.robots: list[Atmega328p] = []
@@ -255,21 +255,27 @@ class KilobotSwarm:
 
     def observe(self, robot: int, observation: Observation | None) -> None:
         """Run a robot instruction by instruction from now on; None: as the others. The result of a run is the same."""
-        self._observed = (robot, observation)
+        self._observed.pop(robot, None)
+        if observation is not None:
+            self._observed[robot] = observation
         self._robots[robot].observation = None if observation is None else addressof(observation)
         self._robots[robot].code = self.robots[robot].program.address
 
     @property
     def is_stopped(self) -> bool:
-        """Whether the observed robot has ended the run: `reason` of its observation says why."""
-        return self._observed[1] is not None and self._observed[1].reason != STOP_NONE
+        """Whether an observed robot has ended the run: `reason` of its observation says why."""
+        return bool(self._stopped())
+
+    def _stopped(self) -> list[int]:
+        """Return the robots that have ended the run."""
+        return [robot for robot, observation in self._observed.items() if observation.reason != STOP_NONE]
 
     def run(self, seconds: float) -> None:
         """Run all robots for a time. Raises KilobotFaultError."""
         self.run_until(self.now + int(seconds * HZ))
 
     def run_until(self, tick: int) -> None:
-        """Run all robots to `tick` (125 ns each), or until the observed one stops; `now` is then its tick.
+        """Run all robots to `tick` (125 ns each), or until an observed one stops; `now` is then its tick.
 
         Raises KilobotFaultError; ValueError after too many calls of `light`.
         """
@@ -284,8 +290,7 @@ class KilobotSwarm:
             self._attend(index)
             if self.is_stopped:
                 break
-        if self.is_stopped:
-            self.now = min(self._robots[self._observed[0]].reached, tick)
+        self.now = min([tick, *(self._robots[robot].reached for robot in self._stopped())])
         if self._air.lost_edges:
             raise ValueError("more pulses of light wait for a robot than there is room for")
         for index in range(len(self.robots)):
@@ -323,7 +328,9 @@ class KilobotSwarm:
             machine.restore(snapshot[at : at + sizeof(Avr)])
             at += sizeof(Avr)
             self._robots[index].code = machine.program.address
-        self.observe(*self._observed)
+            self._robots[index].observation = None
+        for robot, observation in list(self._observed.items()):
+            self.observe(robot, observation)
 
     def close(self) -> None:
         """Do nothing: a swarm holds only memory. The method is for the `with` statement."""
