@@ -12,6 +12,7 @@ import stat
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from errno import ENAMETOOLONG
 from pathlib import Path
 from typing import Final
 
@@ -65,7 +66,8 @@ def _endpoint(address: tuple[str, int]) -> str:
 def listener(place: int | Path) -> Iterator[socket.socket]:
     """Context manager for a listening socket on a port of the loopback address, or on a new Unix socket.
 
-    A Unix socket that a killed server has left is replaced. Raises OSError, for example if another file has the name.
+    A Unix socket that a killed server has left is replaced. Raises OSError with the path, for example if another file
+    has the name.
     """
     if isinstance(place, int):
         with socket.create_server((LOOPBACK, place)) as server:
@@ -74,10 +76,12 @@ def listener(place: int | Path) -> Iterator[socket.socket]:
     if not hasattr(socket, "AF_UNIX"):
         raise OSError("this system has no Unix sockets; use a port")
     with socket.socket(socket.AF_UNIX) as server:
-        _remove_stale(place)
         before = os.umask(PRIVATE)
         try:
+            _remove_stale(place)
             server.bind(str(place))
+        except OSError as error:  # a path that is too long has no number
+            raise OSError(error.errno or ENAMETOOLONG, error.strerror or str(error), str(place)) from None
         finally:
             os.umask(before)
         server.listen()

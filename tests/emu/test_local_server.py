@@ -14,6 +14,7 @@ from pathlib import Path
 import pytest
 
 from arena.replay.http import LOOPBACK, PageServer, RequestHandler
+from emu.cli import main
 from emu.host import local_server
 from emu.host.local_server import REFUSED, accept, address_of, is_own_client, listener
 from tests.watchdog import HANG
@@ -167,6 +168,21 @@ def test_a_unix_socket_is_private_and_removed(tmp_path: Path) -> None:
     finally:
         assert os.umask(before) == 0
     assert not path.exists()
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [("a" * 200, "too long"), ("missing/socket", "No such file or directory"), ("", "Address already in use")],
+)
+def test_an_unusable_path_is_one_line(
+    name: str, words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / name
+    assert main(["debug", "--socket", str(path)]) == 2
+    said = capsys.readouterr().err
+    assert said.startswith(f"emu debug: {path}: ")
+    assert words in said
+    assert said.count("\n") == 1
 
 
 def test_the_socket_of_a_running_server_and_other_files_are_kept(tmp_path: Path) -> None:
