@@ -1,7 +1,8 @@
 """Device headers such as `dspic30f6014a.h`, generated from the register tables of `emu.chips`.
 
-The compiler generates the headers of its chip on first use and keeps them in the user's cache. This compiler and XC16
-accept them. `python -m toolchain.device_header CHIP [NAME]` prints one, such as `timer.h` of the peripheral library.
+The compiler generates the headers of its chip on first use and keeps them in the user's cache, with a keyed checksum:
+damaged headers are generated again. This compiler and XC16 accept the headers. `python -m toolchain.device_header CHIP
+[NAME]` prints one, such as `timer.h` of the peripheral library.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ from pathlib import Path
 import emu.chips
 from emu.chips import NAMES, chip_named
 from emu.chips.chip import Chip, Sfr
+from emu.host.keyed_checksum import content_of, with_checksum
 from emu.host.paths import headers
 from emu.host.private_folder import is_usable, make_private
 from toolchain import peripheral_library
@@ -174,7 +176,7 @@ def _requirement(chip_name: str) -> list[str]:
 def folder_of(chip_name: str) -> Path:
     """Return the folder with the header of a chip and Microchip's names for it.
 
-    The cache keeps one folder per version of the chips' tables.
+    The cache keeps one folder per version of the chips' tables. Damaged headers are written again.
 
     If the cache cannot be written or is not private, the folder is a temporary one. This process removes it at its end.
     """
@@ -182,11 +184,12 @@ def folder_of(chip_name: str) -> Path:
     folder = headers() / _version()
     target = folder / f"{chip.name.lower()}.h"
     safe = is_usable(headers().parent, headers(), folder)
-    if not safe or not target.is_file():
+    if not safe or not _is_intact(target):
         try:
             if not safe:
                 raise PermissionError(folder)
             _write_all(target, chip)
+            _seal(target)
         except OSError:
             temporary = tempfile.mkdtemp(prefix="dspic-headers-")
             atexit.register(shutil.rmtree, temporary, ignore_errors=True)
@@ -199,6 +202,36 @@ def include_folders(chip_name: str) -> tuple[Path, Path]:
     """Return the folder of the device headers and the folder of the chip's peripheral library."""
     folder = folder_of(chip_name)
     return folder, folder / chip_named(chip_name).name.lower()
+
+
+def _digest(target: Path) -> bytes:
+    """Return a hash of the names and contents of all headers that `_write_all` writes. Raises OSError."""
+    digest = hashlib.sha256()
+    own = (target, target.with_name(f"{target.stem}_fields.h"))
+    for path in sorted([*own, *target.parent.glob("p30*.h"), *target.with_suffix("").iterdir()]):
+        digest.update(path.relative_to(target.parent).as_posix().encode() + b"\0" + path.read_bytes() + b"\0")
+    return digest.digest()
+
+
+def _seal_of(target: Path) -> tuple[Path, str]:
+    """Return the file with the checksum of a chip's headers, and the name under which it is computed."""
+    path = target.with_suffix(".checksum")
+    return path, f"{path.parent.name}/{path.name}"
+
+
+def _is_intact(target: Path) -> bool:
+    """Whether the headers of a chip are those that `_seal` has seen."""
+    path, name = _seal_of(target)
+    try:
+        return content_of(headers(), name, path.read_bytes()) == _digest(target)
+    except OSError:
+        return False
+
+
+def _seal(target: Path) -> None:
+    """Store the checksum of a chip's headers. Raises OSError."""
+    path, name = _seal_of(target)
+    _write(path, with_checksum(headers(), name, _digest(target)))
 
 
 def _write_all(target: Path, chip: Chip) -> None:
@@ -225,12 +258,12 @@ def _version() -> str:
     return digest.hexdigest()[:16]
 
 
-def _write(target: Path, text: str) -> None:
-    """Write a header atomically. Raise OSError on failure."""
+def _write(target: Path, content: str | bytes) -> None:
+    """Write a file atomically. Raise OSError on failure."""
     make_private(target.parent)
     handle, temporary = tempfile.mkstemp(prefix=".header.", dir=target.parent)
-    with os.fdopen(handle, "w", encoding="utf-8") as stream:
-        stream.write(text)
+    with os.fdopen(handle, "wb") as stream:
+        stream.write(content.encode() if isinstance(content, str) else content)
     os.replace(temporary, target)
 
 

@@ -33,6 +33,30 @@ def test_the_device_header_is_generated_once(name: str, tmp_path: Path, monkeypa
     device_header.folder_of.cache_clear()
 
 
+@pytest.mark.parametrize("place", ["dspic30f4013.h", "dspic30f4013_fields.h", "p30F4013.h", "dspic30f4013/timer.h"])
+@pytest.mark.parametrize("damage", ["flipped", "cut", "deleted"])
+def test_a_damaged_header_is_generated_again(
+    place: str, damage: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """After a flipped bit, a truncation or a loss of a header, the compiler writes all headers again."""
+    monkeypatch.setenv("OPENSWARM_CACHE", str(tmp_path / "cache"))
+    device_header.folder_of.cache_clear()
+    path = device_header.folder_of("dspic30f4013") / place
+    right = path.read_bytes()
+    if damage == "deleted":
+        path.unlink()
+    else:
+        path.write_bytes(right[:-9] if damage == "cut" else right[:-9] + bytes([right[-9] ^ 1]) + right[-8:])
+    device_header.folder_of.cache_clear()
+    device_header.folder_of("dspic30f4013")
+    assert path.read_bytes() == right
+    written = path.stat().st_mtime_ns
+    device_header.folder_of.cache_clear()
+    device_header.folder_of("dspic30f4013")
+    assert path.stat().st_mtime_ns == written
+    device_header.folder_of.cache_clear()
+
+
 def test_every_register_has_the_address_of_the_chip_table(tmp_path: Path) -> None:
     """Every register has the address of the chip table, as word, bytes and bit-field struct (dspic30f6014a.md §1).
 
