@@ -145,8 +145,8 @@ class Program:
                     found |= self._of_type(name)
                 else:
                     address = self.address(name, annotation)
-                    if address is None and annotation.kind == "targets" and self.sources.file_of(annotation) is None:
-                        continue  # the linker dropped the file that has the target
+                    if address is None and self._is_not_linked(name, annotation):
+                        continue
                     if address is None:
                         raise ToolError(f"{annotation.place}: {name} is neither a function nor a function type")
                     found.add(address)
@@ -158,6 +158,13 @@ class Program:
             names = [ANY]
         taken = self.calls.handles
         return sorted({a for name in names for a in (taken if name == ANY else [self.calls.named(name)])}) or None
+
+    def _is_not_linked(self, name: str, annotation: Annotation) -> bool:
+        """Whether the linker dropped a target: the file of a TARGETS_OF, or a function without code of the own file."""
+        file = self.sources.file_of(annotation)
+        if file is None:
+            return annotation.kind == "targets"
+        return self.sources.declares(file, name) and (file, name) not in self.sources.functions.values()
 
     def _targets_of(self, caller: int) -> list[tuple[Annotation, str]]:
         """Return annotation and targets of each TARGETS_OF of a function or label."""

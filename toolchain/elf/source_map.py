@@ -57,7 +57,7 @@ class SourceMap:
         name, file, line = (attribute.value for attribute in values)
         if file < len(names):
             self._first_lines.setdefault(names[file], {})[line] = name.decode()
-            if begin is not None:
+            if begin is not None and begin.value:  # 0 is the address of a function that the linker dropped
                 self.functions[begin.value] = names[file], name.decode()
 
     def line_of(self, pc: int) -> LineKey:

@@ -91,6 +91,25 @@ def test_no_member_of_a_union_is_lost(monkeypatch: pytest.MonkeyPatch) -> None:
         check_unions(1)
 
 
+def test_a_target_that_the_linker_dropped_adds_nothing(tmp_path: Path) -> None:
+    """TARGETS_OF names a function of its own file that is dropped while its debug information stays."""
+    armed = "extern int (*volatile chosen)(int); void arm(void) { chosen = apply; }\n"
+    target = "static int apply(int x) { return x / 7; }\n"
+    a, b, image = tmp_path / "a.c", tmp_path / "b.c", tmp_path / "a.elf"
+    flags = "-Os", "-g", "-w", "-fno-lto", "-ffunction-sections", "-Wl,--gc-sections"
+    a.write_text(NOTES.replace("NAME", "add") + CALLER)
+    assert build([a], image, *flags).status == 0
+    alone = bound_of(image)
+    assert alone.cycles is not None
+    b.write_text(NOTES.replace("NAME", "apply") + target + armed)
+    assert build([a, b], image, *flags).status == 0
+    assert bound_of(image).cycles == alone.cycles
+    b.write_text(NOTES.replace("NAME", "absent") + target + armed)
+    assert build([a, b], image, *flags).status == 0
+    with pytest.raises(ToolError, match="absent is neither a function nor a function type"):
+        bound_of(image)
+
+
 def test_targets_in_a_file_that_is_not_linked_are_none(tmp_path: Path) -> None:
     """TARGETS_OF names a function of its own file, which the linker has dropped; a wrong name elsewhere is refused."""
     (tmp_path / "a.c").write_text(CALLER)
