@@ -29,8 +29,9 @@ RECEIVED = 20
 DELAYS, DELAY = 12, 7_000
 """Number and length in cycles of the times in which no interrupt is enabled: five bytes at 115,200 baud."""
 ENABLES = ("IEC0", "IEC1", "IEC2")
-RARE = ("refuse_message", "save_dsp")
-"""Functions of memory shortage and of SYS_DSP threads. A run without them does not count their paths (`--without`)."""
+RARE = ("refuse_message", "save_dsp", "swap_reserve")
+"""Functions of memory shortage, of SYS_DSP threads, and of holes larger than the heap's reserve. A run without them
+does not count their paths (`--without`)."""
 LEADS = (2, 4, 6)
 """Cycles from a request to the deepest moment; an interrupt is accepted some cycles after its request."""
 ACCEPTANCE, FRAME, HANDLER = 8, 80, 2_000

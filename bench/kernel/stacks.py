@@ -6,8 +6,8 @@ The run begins with main, or without it with the first C function; stack_observe
 It feeds both UARTs, delays interrupts, and requests them in the deepest moment of every stack. Stacks are those of
 main, of every thread and of the kernel; "alone" excludes what interrupts use of them. The cycles of a handler count if
 it is neither interrupted nor leads to another thread; its bound assumes the greatest lengths of the kernel's lists in
-the run. Bounds exclude refused messages and SYS_DSP threads if the run had none (`--without`). Exit status 1 if a
-measurement exceeds its bound.
+the run. Bounds exclude refused messages, SYS_DSP threads and swaps of the heap's reserve if the run had none
+(`--without`). Exit status 1 if a measurement exceeds its bound.
 """
 
 from __future__ import annotations

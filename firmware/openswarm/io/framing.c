@@ -4,6 +4,7 @@
  * A frame is COBS(message, CRC high byte, CRC low byte) followed by 0. COBS (Cheshire and Baker, IEEE/ACM
  * Transactions on Networking 1999) removes every zero, so that 0 marks the end and a damaged frame costs only
  * itself. Checksum: CRC-16/CCITT-FALSE, polynomial 0x1021, start 0xFFFF. */
+#include "hal_compiler.h"
 #include "io.h"
 
 enum { CRC_BYTES = 2, LONGEST_RUN = 254 };
@@ -17,6 +18,7 @@ static uint16 crc_of(uint16 crc, uint8 byte)
     return crc;
 }
 
+BOUNDS_AT("for (uint16 i", loop d + SYS_UART_RX);
 static uint16 checksum(const uint8 *message, uint16 size)
 {
     uint16 crc = 0xFFFFu;
@@ -39,6 +41,12 @@ static uint8 byte_at(const source *s, uint16 i)
     return (uint8)(i == s->size ? s->crc >> 8 : s->crc);
 }
 
+BOUNDS_AT("while (more)", loop d + 3);
+BOUNDS_AT("while (from + run", loop 254, share Sys_Frame_Tx d + 2);
+BOUNDS_AT("for (uint16 i", loop 254, share Sys_Frame_Tx 2 + d);
+BOUNDS_AT("!put((uint8)", calls sys_put);
+BOUNDS_AT("!put(byte_at", calls sys_put);
+BOUNDS_AT("return put(0)", calls sys_put);
 bool Sys_Frame_Tx(const uint8 *message, uint16 size, sys_put put)
 {
     source s = {message, size, checksum(message, size)};
@@ -65,6 +73,8 @@ bool Sys_Frame_Tx(const uint8 *message, uint16 size, sys_put put)
 }
 
 /* Decodes in place; the result is shorter than the input. Returns its size, or 0 for a damaged frame. */
+BOUNDS_AT("for (uint16 in", loop SYS_UART_RX);
+BOUNDS_AT("for (uint16 i = 0; i < run", loop 254, share Sys_Frame_Rx SYS_UART_RX);
 static uint16 decode(uint8 *frame, uint16 size)
 {
     uint16 out = 0;

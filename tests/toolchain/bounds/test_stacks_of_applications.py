@@ -12,11 +12,11 @@ import pytest
 
 import emu
 from bench.kernel.stack_observer import RETURN_ADDRESS, Observer
-from bench.kernel.stacks import StackRow, rows_of, table
+from bench.kernel.stacks import VALUES, StackRow, rows_of, table
 from tests.firmware.conftest import Build, image
 from tests.fuzz.compiler.fuzz_bounds import examine
 from toolchain.bounds import interference
-from toolchain.bounds.interference import report_of
+from toolchain.bounds.interference import SECOND_STACK, report_of
 from toolchain.bounds.preserved import PreservedRegisters
 from toolchain.bounds.program import Program
 from toolchain.bounds.report import Bound, BoundAnalysis
@@ -86,6 +86,16 @@ def test_no_stack_of_an_application_exceeds_its_bound(image: Build, monkeypatch:
     program = program_of(path)
     planted = BoundAnalysis(program).bound("loggingThread", program.calls.named("loggingThread"), "thread")
     assert RETURN_ADDRESS + planted.bytes < seen.alone["loggingThread"]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("app", ["search", "foraging"])
+def test_every_stack_of_an_application_has_a_bound(image: Build, app: str) -> None:
+    """Loops and calls through pointers of the application and its drivers are annotated."""
+    path = image(app)
+    report = report_of(Program(read_executable(path.read_bytes(), str(path)), VALUES), [])
+    assert report.stacks.keys() >= {"main", SECOND_STACK}
+    assert None not in report.stacks.values(), report.unbounded_stacks
 
 
 @pytest.mark.slow

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Lines of text as messages of UART1. */
 #include "bluetooth.h"
+#include "hal_compiler.h"
 
 enum { CR = '\r', LF = '\n' };
 
@@ -19,6 +20,9 @@ uint16 Sys_Line_Rx(uint8 byte, uint8 *buffer, uint16 *used)
     return 0;
 }
 
+BOUNDS_AT("for (", loop d);
+BOUNDS_AT("!put(", calls sys_put);
+BOUNDS_AT("put(CR)", calls sys_put);
 bool Sys_Line_Tx(const uint8 *message, uint16 size, sys_put put)
 {
     for (uint16 i = 0; i < size; i++) {
