@@ -2,8 +2,8 @@
 
 Pre-registered: equivalence by two one-sided t tests, Wilcoxon's signed ranks, bootstrap bands. A t interval is unsound
 for few pairs with many ties; for this case there are further tests: the exact sign-flip test with its interval and its
-smallest possible p, and a remark if the measure could not differ. Differences are taken seed by seed; random draws are
-seeded.
+smallest possible p. A remark says where a comparison cannot find a difference: both runs at the measure's ceiling, all
+pairs equal, or too few unequal pairs. Differences are taken seed by seed; random draws are seeded.
 """
 
 from __future__ import annotations

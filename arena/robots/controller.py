@@ -188,7 +188,7 @@ class ScriptedController(ControllerWithoutUart):
         self._before: Poses | None = None
 
     def control_step(self, tick: int, poses: Poses) -> tuple[float, float]:
-        """As `Controller.control_step`. A change within the quantum counts by its share of the quantum."""
+        """As `Controller.control_step`. If the speed changes within the quantum, return the mean of the quantum."""
         if tick >= self._off_tick:
             self._reading = Reading()
             return 0.0, 0.0

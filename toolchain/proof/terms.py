@@ -190,7 +190,7 @@ def _unequal(a: Term, b: Term) -> Term:
 
 
 def wide(value: Any) -> Term:
-    """Return a table value in 48 bits."""
+    """Return a value of the instruction table's rules in 48 bits."""
     return value.wide if isinstance(value, SymbolicInteger) else vector(int(value), BITS)
 
 

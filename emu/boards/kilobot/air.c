@@ -231,7 +231,7 @@ static int run_robot(struct air *a, i64 index, u64 goal)
             if (emit(a, index, at, r->avr->lit ? 1 : -1) && answered < goal)
                 goal = answered;
         } else if (result == RUN_BREAK && last_tick(r) >= goal) {
-            // The robot stops in the next run, which knows all light that a stop at this cycle must show.
+            // Report the stop in the next call, which knows all light up to this cycle: the cycle ends after `goal`.
             reached = reached > goal ? reached : goal;
         } else if (result != RUN_LIMIT && result != RUN_HALT) {
             r->reached = reached;

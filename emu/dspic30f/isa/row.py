@@ -43,7 +43,7 @@ class Row:
 
     @property
     def source(self) -> str:
-        """Return the row as a line of source text."""
+        """Name the sources of the row: its mnemonic in the programmer's reference manual, its number in isa.csv."""
         return f"PRM {self.mnemonic}; isa.csv {self.id}"
 
     @cached_property

@@ -14,7 +14,7 @@ enum {
     PACE_MS = 200,     /* pause between messages per near robot: the air is busy for half of the time in any group */
     TICK_SHIFT = 6,    /* times of messages are in ticks of 64 ms */
     HOP = 3,           /* ticks added per hop: more than a message takes from its first light to its handler */
-    FORGET = 208,      /* ticks, 13.3 s, without a sign of life: the robot has failed, and its value no longer counts */
+    FORGET = 208,      /* ticks, 13.3 s, without a heartbeat: the robot has failed, and its value no longer counts */
     NEAR = 78,         /* ticks, 5 s, after the last direct message: the robot is out of reach */
     MOST_AGE = 0xFF,   /* ticks: greatest age in a message */
     NUMBER_BITS = 11,  /* of a robot's number */
@@ -30,7 +30,7 @@ typedef struct {
     uint16 number; /* 0: free entry */
     uint8 value;
     bool counts;  /* included in the mean */
-    uint16 alive; /* tick of the last known sign of life */
+    uint16 alive; /* tick of the last known heartbeat */
     uint16 heard; /* tick of its last message that this robot received */
     bool is_near; /* `heard` is no older than NEAR */
 } entry;
@@ -57,7 +57,7 @@ static entry *place_of(uint16 number)
     return best;
 }
 
-/* Records a sign of life that is `age` ticks old, received from the robot itself or from another one. Each hop adds to
+/* Records a heartbeat that is `age` ticks old, received from the robot itself or through another one. Each hop adds to
  * the age, so the age of a failed robot is never too small. */
 static entry *learn(uint16 number, uint8 value, uint16 age, uint16 now)
 {

@@ -52,7 +52,7 @@ void os_trap(uint16 cause, uint16 pc, uint16 pc_high)
     stop();
 }
 
-enum { FAULT_ASSERTION = 6 }; /* causes of os_trap() are SYS_FAULT_OSCILLATOR to SYS_FAULT_STACK less 1 */
+enum { FAULT_ASSERTION = 6 }; /* next code after those of os_trap(), which are its `cause` plus 1 */
 
 /* Reports "file.c:123 in thread 1" and stops. */
 void Sys_Assertion_Failed(const char *file, uint16 line)

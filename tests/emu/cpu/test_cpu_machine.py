@@ -151,8 +151,8 @@ def test_peek_and_poke_have_no_side_effects(engine: str) -> None:
 
 
 def test_a_run_in_pieces_is_the_run_in_one_go(engine: str) -> None:
-    """Engine contract: a divided run equals one run, because a snapshot excludes the recheck event of a request that
-    DISI blocks."""
+    """Engine contract: a run in pieces equals one run. The engine rechecks a request that DISI blocks by an event of
+    its own, which a snapshot excludes."""
     text = "loop: disi #29\nnop\nnop\nrepeat #11\nnop\nbra loop\nisr: bclr 0x84, #3\nretfie"
     whole, pieces = Rig(text, engine), Rig(text, engine)
     for rig in whole, pieces:

@@ -133,7 +133,10 @@ def test_changes_by_stores_interrupts_and_sleep(path: Path, engine: str, cycles:
 
 @pytest.mark.parametrize("threshold", [1, 9])
 def test_a_change_by_a_hook_belongs_to_the_boundary_before_the_instruction(path: Path, threshold: int) -> None:
-    """A hook's change is logged before the hooked instruction, interpreted (handlers at threshold 9) or native."""
+    """A hook's change is logged at the boundary before the hooked instruction, in interpreted and in native code.
+
+    At threshold 9 the interrupt handlers are still interpreted.
+    """
     found = []
     for engine in ("plain", "jit"):
         machine, writes = machine_of(path, engine), list[tuple[int, int, int, int, int]]()

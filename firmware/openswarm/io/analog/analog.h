@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Devices on the analog converter: proximity, accelerometer, microphones. Each passes its measurements to a
- * pre-processor before it sends an event. A program can exchange the pre-processor; NULL restores the default. */
+/* Analog devices: proximity, accelerometer, microphones. Each passes its measurements to a pre-processor before it
+ * sends an event. A program can exchange the pre-processor; NULL restores the default. Contract lines: openswarm.h. */
 #ifndef ANALOG_H
 #define ANALOG_H
 

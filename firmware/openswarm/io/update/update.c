@@ -145,7 +145,7 @@ bool Sys_Begin_Update(const sys_update *facts)
     sys_update other;
     uint8 kept = choose(&other);
     if (!is_possible(facts) || !Sys_Is_UpdateAllowed(facts->version) || (kept != NONE && !is_confirmed(kept)) || (running != NONE && !is_confirmed(running))) {
-        return false; /* also during the last try, which leaves no tries */
+        return false; /* `running` is checked because choose() skips a program during its last try */
     }
     for (uint8 store = 0; store < HAL_UPDATE_STORES; store++) {
         if (is_whole(store, &other) &&

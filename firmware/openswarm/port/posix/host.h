@@ -11,7 +11,7 @@
 #include <stdint.h>
 
 void host_use_virtual_time(void);           /* before Sys_Start_Kernel */
-void host_at_idle(void (*hook)(uint32_t));  /* called on the kernel stack before each idle; argument: their number */
+void host_at_idle(void (*hook)(uint32_t));  /* on the kernel stack, before each idle; argument: idles so far */
 
 /* Interrupts, from any context; taken at once or when the level allows. */
 void host_tick(void);                        /* 1 ms clock */

@@ -200,7 +200,7 @@ static void timers_send_their_events(void)
     heard = 0;
     Sys_Sleep(15);
     CHECK(heard == 0);
-    CHECK(Sys_Start_Timer(&once, E1, 1, 30000, 0) && Sys_Start_Timer(&once, E1, 2, 2, 0)); /* it starts again */
+    CHECK(Sys_Start_Timer(&once, E1, 1, 30000, 0) && Sys_Start_Timer(&once, E1, 2, 2, 0)); /* the second restarts it */
     hear_until(1);
     Sys_Sleep(5);
     CHECK(heard == 1 && refused_as(Sys_Stop_Timer(&once), SYS_ERROR_PROCESS));

@@ -1,6 +1,6 @@
 /* Included before every file of the image (app.mk): allocations may fail, and every unlock of a level is counted, so that
- * an interrupt can occur within a call. Loads and stores of words are single steps on every CPU but the AVR, and in the
- * model: hal_cpu.h writes (hal_unlock) where they unlock, which this macro does not replace. */
+ * an interrupt can occur within a call. The model treats HAL_LOAD and HAL_STORE as atomic. On the AVR they lock and
+ * unlock, but hal_cpu.h calls (hal_unlock) in parentheses, so that this macro does not count them. */
 #ifndef __ASSEMBLER__
 #include "hal_cpu.h"
 

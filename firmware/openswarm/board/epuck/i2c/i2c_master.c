@@ -20,7 +20,7 @@ enum {
     READ = 1,
     PIN_SCL = 0x0004, /* RG2 */
     PIN_SDA = 0x0008, /* RG3 */
-    HALF_BIT_LOOPS = 20, /* over 75 Tcy each */
+    HALF_BIT_LOOPS = 20, /* a half bit lasts over 75 Tcy */
     CLOCKS = 9,       /* a slave releases SDA after at most a byte and its acknowledge */
     PATIENCE = 20000  /* polls of some 15 Tcy: 20 ms; one byte takes 0.2 ms */
 };
