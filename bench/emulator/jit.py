@@ -20,6 +20,7 @@ import sys
 import tempfile
 import threading
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -147,7 +148,7 @@ def until_done(command: list[str]) -> float:
     return spent
 
 
-EMULATORS = {
+EMULATORS: dict[str, Callable[[Path], list[str]]] = {
     "simavr": lambda image: ["simavr", "-m", "atmega2560", "-f", "16000000", str(image)],
     "qemu-system-avr": lambda image: ["qemu-system-avr", "-M", "mega2560", "-bios", str(image), "-nographic"],
 }

@@ -122,6 +122,8 @@ def on_dspic(folder: Path) -> dict[str, Any]:
         images[app] = load_image(str(folder / app / "firmware.elf"))
     cycles = {name: window.cycles for name, window in run_measures(images["latency"]).items()}
     equation = memory_equation(images["footprint"])
+    if equation is None:
+        raise SystemExit("rtos: the footprint image has no symbols of the measuring application")
     alone = equation["sizes"]["kernel"]
     return {
         "flash": alone["rom"],

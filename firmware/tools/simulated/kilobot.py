@@ -135,7 +135,8 @@ class Kilobot:
     @property
     def sp(self) -> int:
         """Return the stack pointer, which points to the next free byte."""
-        return self._data[0x5D] | self._data[0x5E] << 8
+        low, high = self.peek_bytes(0x5D, 2)
+        return low | high << 8
 
     def return_address(self) -> int:
         stacked = self.peek_bytes(self.sp + 1, 2)

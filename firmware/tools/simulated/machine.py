@@ -27,12 +27,12 @@ class Symbols:
             self.thumb = elf["e_machine"] == "EM_ARM"
             tables = [section for section in elf.iter_sections() if isinstance(section, SymbolTableSection)]
             found = {symbol.name: symbol.entry for table in tables for symbol in table.iter_symbols() if symbol.name}
-            self.sections = {
+            self.sections: dict[str, int] = {
                 section.name: section["sh_size"] for section in elf.iter_sections() if section["sh_flags"] & 2
             }
-        self._address = {name: entry["st_value"] for name, entry in found.items()}
+        self._address: dict[str, int] = {name: entry["st_value"] for name, entry in found.items()}
         self._function = {name for name, entry in found.items() if entry["st_info"]["type"] == "STT_FUNC"}
-        self.size = {name: entry["st_size"] for name, entry in found.items()}
+        self.size: dict[str, int] = {name: entry["st_size"] for name, entry in found.items()}
 
     def __contains__(self, name: str) -> bool:
         return name in self._address

@@ -191,7 +191,7 @@ class Qemu:
         block."""
         board = self.board
         wanted = {board.argument: address, board.argument + 1: value, board.pc: self.symbols["inject_store"]}
-        status = [board.status] * (board.status is not None)
+        status = [] if board.status is None else [board.status]
         before = {number: self._ask(f"p{number:x}") for number in (*wanted, *status)}
         for number in status:
             wanted[number] = int.from_bytes(bytes.fromhex(before[number]), "little") & ~board.conditional
