@@ -64,10 +64,8 @@ def transport(runs: Runs) -> Figure:
                           for one, end in zip(trials, ends, strict=True)])  # fmt: skip
         there = ~np.isnan(found[:, 0])
         times, count = found[there, 0], int(there.sum())
-        low = beta.ppf(0.025, count, len(trials) - count + 1) if count else 0.0
-        high = beta.ppf(0.975, count + 1, len(trials) - count) if count < len(trials) else 1.0
         spread = f"{np.median(times):.0f} | {times.min():.0f} to {times.max():.0f}" if count else "- | -"
-        print(f"| {name} | {count} of {len(trials)} | {100 * low:.0f} to {100 * high:.0f} % | {spread} | "
+        print(f"| {name} | {count} of {len(trials)} | {interval(count, len(trials))} | {spread} | "
               f"{np.median(found[:, 1]):.2f} |")  # fmt: skip
         axis, curve = above[column], below[column]
         frame(axis, trials[0])
@@ -78,6 +76,13 @@ def transport(runs: Runs) -> Figure:
         axis.set_title(f"{name}: {count} of {len(trials)}", fontsize=9)
         curve.set(xlabel="s", ylabel="cm from the goal" if not column else "", ylim=(0, None))
     return figure
+
+
+def interval(count: int, trials: int) -> str:
+    """Return the 95 % interval (Clopper and Pearson) of the rate of `count` successes in `trials`."""
+    low = beta.ppf(0.025, count, trials - count + 1) if count else 0.0
+    high = beta.ppf(0.975, count + 1, trials - count) if count < trials else 1.0
+    return f"{100 * low:.0f} to {100 * high:.0f} %"
 
 
 def main() -> None:

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import json
 import math
+import re
 from pathlib import Path
 
+import canonical
 import numpy as np
 import pytest
 
@@ -14,6 +17,10 @@ from arena.experiments.builtin.transport import MEASURES
 from arena.robots.reactive import steps_per_second
 from arena.scene.loader import SceneError, load_scene
 from arena.trial.record import Trial, read_trial
+from emu.cli import main as emu
+from tests.firmware.conftest import built_once
+
+PAGE = (Path(__file__).resolve().parents[3] / "docs/canonical.md").read_text(encoding="utf-8")
 
 
 def trial_of(scene: str, minutes: str, out: Path, *more: str) -> Trial:
@@ -39,11 +46,51 @@ def test_robots_gather(tmp_path: Path) -> None:
     assert dispersion[-1] < 0.6 * dispersion[0]
 
 
+def row(run: str) -> list[str]:
+    """Return the cells of a run's row on the page, without its name."""
+    found = re.search(rf"^\| {run} \| (.*) \|$", PAGE, re.MULTILINE)
+    assert found is not None, run
+    return found[1].split(" | ")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("robots", "seconds"), [(10, 600), (20, 180)])
+def test_scripted_robots_form_one_group_when_the_page_says_so(tmp_path: Path, robots: int, seconds: int) -> None:
+    """Where the page prints a mean of 100.0 %, all trials have one group; so does the trial of seed 1."""
+    assert row(f"scripted-{robots}")[1 + (180, 600, 900).index(seconds)] == "100.0 %"
+    options = "--controller", "aggregate", "--robots", str(robots)
+    trial = trial_of("gauci2014", str(seconds / 60), tmp_path / "out", *options)
+    assert trial.series.last("cluster") == 1
+
+
 @pytest.mark.slow
 def test_forty_robots_form_one_group(tmp_path: Path) -> None:
     """Forty scripted robots are in one group after ten minutes (published: 98.6 % of the robots)."""
     trial = trial_of("gauci2014", "10", tmp_path / "out", "--controller", "aggregate")
     assert trial.series.last("cluster") > 0.95
+
+
+def test_the_intervals_of_transport_follow_from_the_arrivals() -> None:
+    """Every interval beside `N of M` on the page is that of Clopper and Pearson, and the sums are those of the rows."""
+    rows = re.findall(r"^\| ([\w-]+) \| (\d+) of (\d+) \| (\d+ to \d+ %) \|", PAGE, re.MULTILINE)
+    assert len(rows) == 6
+    arrivals = {name: int(count) for name, count, _, _ in rows}
+    assert [one[3] for one in rows] == [canonical.interval(int(count), int(trials)) for _, count, trials, _ in rows]
+    text = " ".join(PAGE.split())
+    of_one_area = sum(arrivals[name] for name in ("square-40", "triangle-60", "disc-45"))
+    assert f"in 43 of 45 trials (abstract), 95 % interval {canonical.interval(43, 45)}. Here {of_one_area} of" in text
+    assert f"of the 45 trials with the three shapes of one area succeed, {canonical.interval(of_one_area, 45)}" in text
+    failures = sum(int(trials) - int(count) for name, count, trials, _ in rows if name != "openswarm-10")
+    assert f"In all {failures} failures of the table" in text
+
+
+def test_the_size_of_the_transport_program_is_the_counted_one(
+    tmp_path_factory: pytest.TempPathFactory, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """`emu footprint` counts the bytes of the page."""
+    assert emu(["footprint", str(built_once(tmp_path_factory, "transport")), "--json"]) == 0
+    total = json.loads(capsys.readouterr().out)
+    assert f"The program uses {total['rom']:,} bytes of ROM and {total['ram']:,} of the 8,192 bytes of RAM" in PAGE
 
 
 def test_transport_is_measured_from_circle_to_circle() -> None:
