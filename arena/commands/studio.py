@@ -26,8 +26,8 @@ from arena.commands.options.plan import add_plan, plan_from
 from arena.replay.http import LOOPBACK, PageServer, RequestHandler
 from arena.replay.page import page, waiting_page
 from arena.scene.loader import FCY
+from arena.studio.errors import CommandRefusedError
 from arena.studio.process import Call, Studio
-from arena.studio.session import CommandRefusedError
 from arena.studio.startup import STAGES, Startup
 from emu.host.errors import CommandParser
 

@@ -12,7 +12,7 @@ from threading import Lock
 from typing import Any, Final, NamedTuple
 
 from arena.campaign.campaign import Plan
-from arena.studio.session import CommandRefusedError, serve
+from arena.studio.errors import CommandRefusedError
 from arena.trial.checkpoints import PATIENCE_S, Checkpoint, CheckpointPool, PipeClosedError, PipeEnd, context, pipe
 
 
@@ -42,6 +42,8 @@ class Studio:
     """
 
     def __init__(self, plan: Plan, seed: int, on_process: Callable[[], None] = lambda: None) -> None:
+        from arena.studio.session import serve  # imported late: a server answers before this
+
         self._lock: Final = Lock()
         self._checkpoints: Final = CheckpointPool()
         self._pipe, there = pipe()

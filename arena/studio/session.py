@@ -23,6 +23,7 @@ from arena.replay.page import sample_data
 from arena.robots.firmware_controller import FirmwareController, function_at
 from arena.robots.kilobot import KilobotController
 from arena.scene.loader import SceneError
+from arena.studio.errors import CommandRefusedError
 from arena.trial.checkpoints import CAN_FORK, PipeClosedError, PipeEnd, ProcessForker
 from arena.trial.record import Trial
 from arena.trial.snapshot import state_digest
@@ -32,10 +33,6 @@ POLL_S: Final = 0.05
 """Longest time, in seconds, between two looks of a paused trial at its pipe."""
 MAX_FRAMES: Final = 12
 """Frames of a call stack that `inspect` returns."""
-
-
-class CommandRefusedError(ValueError):
-    """The session cannot execute a command in its present state, or the command is invalid."""
 
 
 class Action(NamedTuple):

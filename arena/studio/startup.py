@@ -7,8 +7,8 @@ from threading import Thread
 from typing import Final
 
 from arena.campaign.campaign import Plan
+from arena.studio.errors import CommandRefusedError
 from arena.studio.process import Studio
-from arena.studio.session import CommandRefusedError
 from arena.trial.checkpoints import PATIENCE_S
 
 STAGES: Final = ("check the scene and build its firmware", "start the process of the trial",

@@ -28,8 +28,8 @@ from arena.commands import studio as command
 from arena.commands.studio import HEADER, StudioServer, server
 from arena.robots.controller import ScriptedController
 from arena.scene.loader import Scene, load_scene, scripted
+from arena.studio.errors import CommandRefusedError
 from arena.studio.process import Call, Studio
-from arena.studio.session import CommandRefusedError
 from arena.studio.startup import STAGES, Startup
 from arena.trial import checkpoints
 from arena.trial.trial import run_trial
