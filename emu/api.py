@@ -45,8 +45,10 @@ from emu.peripherals import Peripherals
 from emu.system.events import NEVER
 
 if TYPE_CHECKING:
-    from emu.debug.inspector import Frame, Inspector, Value
+    from emu.debug.frame import Frame
+    from emu.debug.inspector import Inspector
     from emu.debug.threads import Thread
+    from emu.debug.value import Value
     from emu.dspic30f.change_log import Entries
 
 

@@ -10,7 +10,7 @@ from emu.dap.state_requests import StateRequests
 from emu.dap.variables import Row
 from emu.debug.expressions.expression import evaluate
 from emu.debug.inlining import inlined_entries
-from emu.debug.inspector import Value
+from emu.debug.value import Value
 
 ACCESSES: Final = ("read", "write", "readWrite")
 """Access types at which a data breakpoint can stop."""

@@ -9,7 +9,9 @@ from typing import Final
 from emu.dap.console import COMMANDS
 from emu.debug.dwarf.location import Unavailable
 from emu.debug.expressions.expression import ExpressionError, evaluate
-from emu.debug.inspector import Frame, Inspector, Value
+from emu.debug.frame import Frame
+from emu.debug.inspector import Inspector
+from emu.debug.value import Value
 
 LAST: Final = re.compile(r"(?:([A-Za-z_$][\w.\[\]>-]*?)(?:\.|->))?([A-Za-z_$]?\w*)$")
 """Splits a text into the expression before the last dot or arrow, if there is one, and the beginning of a name."""

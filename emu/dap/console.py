@@ -8,8 +8,8 @@ from typing import Final
 from emu.dap.debuggee import Debuggee, StopEvent
 from emu.debug.dwarf.location import address_of
 from emu.debug.expressions.expression import evaluate
-from emu.debug.inspector import Value
 from emu.debug.threads import Thread
+from emu.debug.value import Value
 
 COMMANDS: Final = {
     "time": "              show cycle, seconds, and the distance to the present",

@@ -15,9 +15,10 @@ from emu.dap.breakpoints import Breakpoint
 from emu.dap.logged_writes import can_log_writes, logged_writes, site_of
 from emu.debug.dwarf.units import Scope
 from emu.debug.expressions.condition_filters import filter_of
+from emu.debug.frame import Frame
 from emu.debug.history import History
 from emu.debug.inlining import inlined_at
-from emu.debug.inspector import Frame, Inspector
+from emu.debug.inspector import Inspector
 from emu.debug.processor import Processor
 from emu.debug.threads import Thread, Threads
 from emu.image.lines import SourceLine

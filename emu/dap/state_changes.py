@@ -10,7 +10,9 @@ from typing import Any, Protocol
 
 from emu.debug.dwarf.location import Piece
 from emu.debug.dwarf.types import Type
-from emu.debug.inspector import Frame, Inspector, Value
+from emu.debug.frame import Frame
+from emu.debug.inspector import Inspector
+from emu.debug.value import Value
 
 
 class StateChange(Protocol):

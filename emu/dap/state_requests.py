@@ -14,7 +14,7 @@ from emu.dap.sfrs import sfr_groups
 from emu.dap.state_changes import MemoryWrite, StateChange, assignment
 from emu.dap.variables import ReferenceTable, Row, SourceFiles, disassembly_rows
 from emu.debug.expressions.expression import evaluate
-from emu.debug.inspector import Value
+from emu.debug.value import Value
 
 MAX_ROWS: Final = 1 << 16
 """Maximum number of instructions or bytes per request: the size of a chip's memory."""

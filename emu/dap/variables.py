@@ -13,7 +13,9 @@ from urllib.parse import unquote
 
 from emu.debug.dwarf.location import Piece, Unavailable
 from emu.debug.dwarf.types import UNSIGNED, parts_of
-from emu.debug.inspector import Frame, Inspector, Value
+from emu.debug.frame import Frame
+from emu.debug.inspector import Inspector
+from emu.debug.value import Value
 from emu.host.sources import SourceFinder
 from emu.image.lines import SourceLine
 

@@ -23,7 +23,8 @@ from typing import TYPE_CHECKING, Final
 
 from emu.chips.chip import Vector
 from emu.debug.dwarf.location import Unavailable
-from emu.debug.inspector import Frame, Inspector
+from emu.debug.frame import Frame
+from emu.debug.inspector import Inspector
 from emu.debug.replay import ExecutionTrace, retrace, sandboxed
 from emu.debug.threads import Threads
 from emu.dspic30f.exceptions.faults import RESTART

@@ -6,16 +6,17 @@ Input: a machine between two instructions. Outputs: `Frame`s and `Value`s. Only 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 from emu.debug.dspic30f import Dspic30f
 from emu.debug.dwarf import location
-from emu.debug.dwarf.types import UNSIGNED, Type, decode, decode_member, encode, parts_of, text_of
+from emu.debug.dwarf.types import UNSIGNED, Type
 from emu.debug.dwarf.units import DebugInfo, Scope, Variable
+from emu.debug.frame import Frame, FrameView
 from emu.debug.processor import Debugged, Processor
 from emu.debug.unwind import RawFrame
+from emu.debug.value import Value
 from emu.image.lines import SourceLine
 from emu.image.model import Image
 
@@ -26,31 +27,6 @@ FRAME_OPERATIONS: Final = (location.FBREG, location.BREG0 + 28)
 """DWARF operations with which the location of a frame variable begins: the frame base, or avr-gcc's frame pointer Y."""
 REMOVED_BY_LINKER: Final = bytes(location.ADDR_0)
 """Location expression that the linker writes for a removed variable."""
-
-
-@dataclass(frozen=True, slots=True)
-class Frame:
-    """One entry of a call stack; lists begin with the innermost. An inlined function has its own entry."""
-
-    pc: int
-    """Address of the frame's next instruction; for a caller, the return address."""
-    function: str
-    """Name of the C or assembly function; its address if it has no name."""
-    line: SourceLine | None
-    kind: str
-    """How the frame was entered: "call", "interrupt" (any exception) or "inlined"."""
-    scopes: tuple[Scope, ...]
-    """Nested scopes of this entry that contain `pc`, outermost first. Empty without debug information."""
-    raw: RawFrame
-    at: int
-    """Address for the lookup of variables: `pc`, or for a caller an address inside its call instruction."""
-
-    def __str__(self) -> str:
-        where = f" ({self.line})" if self.line is not None else ""
-        return f"{self.function}{where} at {self.pc:#08x}" + (f" [{self.kind}]" if self.kind != "call" else "")
-
-    def __repr__(self) -> str:
-        return f"<Frame {str(self)[:180]}>"
 
 
 class Inspector:
@@ -162,7 +138,7 @@ class Inspector:
 
     def view(self, frame: Frame | None = None) -> FrameView:
         """Return the registers and memory as visible from `frame`; None means the machine's current registers."""
-        return FrameView(self, frame)
+        return FrameView(self.machine, self.processor, frame)
 
     def variables(self, frame: Frame) -> list[Variable]:
         """Return the parameters and locals in scope, in order of declaration.
@@ -257,173 +233,3 @@ def is_frame_variable(variable: Variable) -> bool:
 def has_frame_variables(scope: Scope) -> bool:
     """Whether a function has a variable with a fixed location in its frame."""
     return any(map(is_frame_variable, scope.variables)) or any(map(has_frame_variables, scope.inner))
-
-
-class FrameView:
-    """`location.View` of one frame: the registers saved in it and the current memory."""
-
-    def __init__(self, inspector: Inspector, frame: Frame | None) -> None:
-        self._machine: Final = inspector.machine
-        self._processor: Final = inspector.processor
-        self.frame: Final = frame
-        top = self._processor.stack_pointer
-        self._is_innermost: Final = frame is None or (
-            frame.raw.pc == self._machine.pc and frame.raw.registers[top] == self._machine.w[top]
-        )
-
-    @property
-    def pc(self) -> int:
-        """Address for the lookup of variables. For a caller's frame it is inside the call instruction."""
-        return self._machine.pc if self.frame is None else self.frame.at
-
-    def register_size(self, number: int) -> int:
-        """Return the size of a register in bytes."""
-        return self._processor.register_size(number)
-
-    def register_name(self, number: int) -> str:
-        """Return the name of the register with a DWARF number."""
-        names = self._processor.register_names
-        return names[number] if number < len(names) else f"register {number}"
-
-    def register(self, number: int) -> int | None:
-        """Return the value of a register, None if it is unknown in this frame."""
-        if number >= len(self._processor.register_names):
-            return None
-        if self.frame is None or self._is_innermost:
-            return self._machine.w[number]
-        return self.frame.raw.registers[number]
-
-    def address_in(self, number: int) -> int | None:
-        """Return the address that a register holds, None if it is unknown in this frame."""
-        return self._processor.address_in(self.register, number)
-
-    def set_register(self, number: int, value: int) -> None:
-        """Set a register of the innermost frame. Raises ValueError for another frame."""
-        if not self._is_innermost:
-            raise ValueError("only registers of the innermost frame can be changed")
-        self._machine.w[number] = value
-
-    def memory(self, address: int, size: int) -> bytes:
-        """Return bytes of data space. Raises ValueError."""
-        return self._machine.peek_bytes(address, size)
-
-    def set_memory(self, address: int, data: bytes) -> None:
-        """Write bytes of data space; peripheral registers react as to an instruction. Raises ValueError."""
-        self._processor.write(address, data)
-
-
-class Value:
-    """A typed object located in memory, in registers, or in debug information as a constant."""
-
-    def __init__(
-        self,
-        kind: Type,
-        pieces: tuple[location.Piece, ...],
-        view: location.View,
-        name: str = "",
-        bits: tuple[int, int] | None = None,
-    ) -> None:
-        self.type: Final = kind
-        self.pieces: Final = pieces
-        self.name: Final = name
-        self._view: Final = view
-        self.bits: Final = bits
-        """Width and least significant bit of a bit field; None for other objects."""
-
-    @property
-    def address(self) -> int | None:
-        """Data address of the object, None if it does not lie entirely in memory."""
-        return location.address_of(self.pieces)
-
-    @property
-    def data(self) -> bytes:
-        """Bytes of the object. Raises Unavailable."""
-        return location.read(self.pieces, max(self.type.bytes, 1), self._view)
-
-    def get(self) -> Any:
-        """Return the value as a Python object: int, float, bool, dict of members, list of elements.
-
-        Raises Unavailable.
-        """
-        if self.bits is not None:
-            from emu.debug.dwarf.types import Member
-
-            return decode_member(Member("", self.type, 0, *self.bits), self.data)
-        return decode(self.type, self.data)
-
-    def set(self, value: Any) -> None:
-        """Assign a number. Raises Unavailable, ValueError for a number that does not fit, TypeError for aggregates."""
-        if self.bits is not None:
-            count, lsb = self.bits
-            number, mask = int(value), (1 << count) - 1 << lsb
-            if not -(1 << count - 1) <= number < 1 << count:
-                raise ValueError(f"{number} does not fit into the {count} bits of {self.name}")
-            word = int.from_bytes(self.data, "little") & ~mask | number << lsb & mask
-            location.write(self.pieces, word.to_bytes(self.type.bytes, "little"), self._view)
-            return
-        location.write(self.pieces, encode(self.type, value), self._view)
-
-    @property
-    def frame(self) -> Frame | None:
-        """The frame in which the object was looked up, None for the machine itself."""
-        return self._view.frame if isinstance(self._view, FrameView) else None
-
-    def rebind(self, inspector: Inspector) -> Value:
-        """Return the same object in another machine that is in the same state."""
-        return Value(self.type, self.pieces, inspector.view(self.frame), self.name, self.bits)
-
-    def text(self) -> str:
-        """Return the value as one line of text, or the reason why it is unavailable."""
-        try:
-            return text_of(self.type, self.get())
-        except location.Unavailable as why:
-            return f"<{why}>"
-
-    def __getitem__(self, part: str | int) -> Value:
-        """Return a member by name, an element by index, or a pointer's target (index 0). Raises KeyError, TypeError."""
-        bare = self.type.bare
-        if isinstance(part, str):
-            member = self.type.member(part)
-            if member is None:
-                raise KeyError(f"{self.type} has no member {part!r}")
-            bits = (member.bits, member.lsb) if member.bits else None
-            return Value(member.type, self._slice(member.offset, member.type.bytes), self._view, part, bits)
-        target = bare.target
-        if bare.kind not in ("array", "pointer") or target is None:
-            raise TypeError(f"{self.type} has no elements")
-        if bare.kind == "pointer":
-            place = location.Piece("memory", self.get() + part * max(target.bytes, 1) & 0xFFFF)
-            return Value(target, (place,), self._view, f"{self.name}[{part}]")
-        if not 0 <= part < bare.count:
-            raise KeyError(f"{self.name or 'the array'} has elements 0 to {bare.count - 1}, not {part}")
-        return Value(target, self._slice(part * target.bytes, target.bytes), self._view, f"{self.name}[{part}]")
-
-    def parts(self) -> Iterator[Value]:
-        """Yield the members of a struct, the elements of an array, or the target of a pointer."""
-        bare = self.type.bare
-        if bare.kind == "pointer" and bare.target is not None and bare.target.bare.kind not in ("void", "function"):
-            yield self[0]
-        for member in parts_of(self.type):
-            bits = (member.bits, member.lsb) if member.bits else None
-            yield Value(member.type, self._slice(member.offset, member.type.bytes), self._view, member.name, bits)
-
-    def _slice(self, offset: int, size: int) -> tuple[location.Piece, ...]:
-        """Return the pieces that contain `size` bytes from `offset`."""
-        found = []
-        begin = 0
-        for piece in self.pieces:
-            length = piece.size or self.type.bytes - begin
-            first, last = max(offset, begin), min(offset + size, begin + length)
-            if first < last:
-                skip = first - begin
-                if piece.kind == "register":
-                    number, skip = divmod(skip + piece.skip, self._view.register_size(piece.at))
-                    found.append(location.Piece("register", piece.at + number, last - first, skip=skip))
-                elif piece.kind == "memory":
-                    found.append(location.Piece("memory", piece.at + skip, last - first))
-                else:
-                    found.append(location.Piece(piece.kind, 0, last - first, piece.data[skip:]))
-            begin += length
-        if len(found) == 1 and found[0].kind == "memory":
-            return (location.Piece("memory", found[0].at),)
-        return tuple(found)

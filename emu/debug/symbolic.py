@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 from emu.debug.expressions.expression import evaluate, number_of
 
 if TYPE_CHECKING:
-    from emu.debug.inspector import Inspector, Value
+    from emu.debug.inspector import Inspector
+    from emu.debug.value import Value
 
 
 def read(inspector: Inspector, expression: str) -> Any:

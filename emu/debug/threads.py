@@ -12,9 +12,11 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
 from emu.debug.dwarf.location import Unavailable
-from emu.debug.inspector import Frame, Inspector, Value
+from emu.debug.frame import Frame
+from emu.debug.inspector import Inspector
 from emu.debug.replay import sandboxed
 from emu.debug.unwind import REGISTERS
+from emu.debug.value import Value
 from emu.dspic30f.isa.codec import decode_for_execution
 from emu.dspic30f.isa.facts import facts_of
 from emu.dspic30f.isa.flow import Return

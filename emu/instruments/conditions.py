@@ -16,7 +16,8 @@ from emu.dspic30f.change_log import Entries, WatchedNumber
 from emu.instruments.changes import is_in_ram, log_changes
 
 if TYPE_CHECKING:
-    from emu.debug.inspector import Frame, Inspector
+    from emu.debug.frame import Frame
+    from emu.debug.inspector import Inspector
     from emu.machine.machine import Machine
     from emu.machine.stops import Stop
     from emu.system.hook_filters import Filter

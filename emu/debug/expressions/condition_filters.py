@@ -12,8 +12,10 @@ from typing import Final
 
 from emu.debug.dwarf.location import Unavailable
 from emu.debug.expressions.expression import ExpressionError, evaluate, tokens
-from emu.debug.inspector import Frame, Inspector, Value
+from emu.debug.frame import Frame
+from emu.debug.inspector import Inspector
 from emu.debug.unwind import REGISTERS
+from emu.debug.value import Value
 from emu.system.hook_filters import OPERATORS, Comparison, Filter
 
 _MIRRORED: Final = {"<": ">", "<=": ">=", ">": "<", ">=": "<="}

@@ -32,7 +32,9 @@ from emu.debug.expressions.arithmetic import (
     promote,
 )
 from emu.debug.expressions.type_names import TypeNameError, type_name
-from emu.debug.inspector import Frame, Inspector, Value
+from emu.debug.frame import Frame
+from emu.debug.inspector import Inspector
+from emu.debug.value import Value
 
 TOKEN: Final = re.compile(
     r"\s*(?:((?:\d+\.\d*|\.\d+)(?:[eE][-+]?\d+)?[fFlL]?|\d+[eE][-+]?\d+[fFlL]?)|((?:0[xX][0-9a-fA-F]+|0[bB][01]+|\d+)[uUlL]*)"
