@@ -15,7 +15,12 @@ function start() {
   playing = true; last = performance.now(); play.textContent = "Pause record"; next();
 }
 function pause() { playing = false; play.textContent = "Play record"; }
-function choose(robot) { const count = d.robots.length; chosen = robot < 0 ? -1 : robot % count; draw(); }
+function choose(robot) {
+  chosen = robot < 0 ? -1 : robot % d.robots.length;
+  const seen = el("seen"), row = chosen * STRIP_HEIGHT;
+  if (chosen >= 0 && (row < seen.scrollTop || row + STRIP_HEIGHT > seen.scrollTop + seen.clientHeight)) seen.scrollTop = row;
+  draw();
+}
 function grow(whole, more) {             // appends to arrays over the samples, replaces the rest
   for (const key in more)
     if (key === "curves") for (const name in more.curves) d.curves[name].push(...more.curves[name]);

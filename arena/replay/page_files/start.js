@@ -9,6 +9,7 @@ el("trails").onchange = el("sensors").onchange = el("track").onchange = draw;
 canvas.addEventListener("wheel", e => { e.preventDefault(); zoomed(e.deltaY < 0 ? 1.2 : 1 / 1.2, e.offsetX, e.offsetY); }, {passive: false});
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { colours(); draw(); });
 colours();
+el("seen").onscroll = drawStrips;
 scrub.oninput = () => move(Number(scrub.value));
 new ResizeObserver(layout).observe(el("stage"));
 scrub.max = d.t.length - 1;

@@ -9,6 +9,7 @@ const SEEN_COLOUR = d.palette.seen, GROUPS = d.palette.groups;
 const POLL_MS = 1000, FRAME_MS = 16, FCY = 14745600, TRAIL_S = 30, MARGIN = 14;
 const LEDS = ["led0", "led1", "led2", "led3", "led4", "led5", "led6", "led7", "front", "body"];
 const STRIP_HEIGHT = 14, STRIP_PIXEL = 8;
+const LEAST_ZOOM = d.walls || d.polygon.length ? 1 : 0.02;  // without walls, robots may be far outside the rectangle
 const BEARING = Math.PI / 4;             // angle between two ring LEDs, which follow clockwise from the front
 let PLOT_HEIGHT = 62, plotWidth = 384, sample = 0, playing = false, clock = 0, last = 0, chosen = -1, scale = 1, left = 0, low = 0;
 let zoom = 1, panX = 0, panY = 0;        // zoom and offset in pixels; 1, 0, 0 shows the whole arena in the middle
@@ -25,7 +26,9 @@ function layout() {
   sized(canvas, width, height);
   PLOT_HEIGHT = innerHeight < 650 || innerWidth <= 820 ? 40 : 62;
   plotWidth = Math.max(Math.min(el("legend").clientWidth, 800), 200);
-  sized(strips, 384, d.robots.length * STRIP_HEIGHT || 1);
+  const rows = d.robots.length * STRIP_HEIGHT || 1;
+  el("rows").style.height = rows + "px";
+  sized(strips, 384, Math.min(rows, el("seen").clientHeight || rows, innerHeight));  // the rows on screen: canvases have a limit
   sized(plot, plotWidth, Math.max(d.metrics.length, 1) * PLOT_HEIGHT);
   draw();
 }
@@ -44,7 +47,7 @@ function place(part) {                   // scale and origin of the view
 }
 function zoomed(by, x, y) {              // keeps the point of the floor under the pointer
   const before = zoom;
-  zoom = Math.min(Math.max(zoom * by, 1), 40);
+  zoom = Math.min(Math.max(zoom * by, LEAST_ZOOM), 40);
   const real = zoom / before, middleX = canvas.clientWidth / 2, middleY = (canvas.clientHeight - 16) / 2;
   panX = (panX + middleX - x) * real - middleX + x; panY = (panY + middleY - y) * real - middleY + y;
   if (zoom === 1) panX = panY = 0;
@@ -108,7 +111,7 @@ function drawGround() {
   }
   g.lineWidth = 1;
   d.obstacles.forEach(one => { shape(one, one.colour); g.stroke(); });
-  const bar = [100, 50, 10].find(one => one <= d.width / zoom / 3) || 1, foot = canvas.clientHeight - 10;
+  const bar = [10000, 5000, 1000, 500, 100, 50, 10].find(one => one <= d.width / zoom / 3) || 1, foot = canvas.clientHeight - 10;
   g.fillStyle = INK; g.fillRect(MARGIN, foot, bar * scale, 3); g.fillText(`${bar} cm`, MARGIN + bar * scale + 5, foot + 5);
 }
 function drawTrails() {
@@ -225,8 +228,10 @@ function drawChosen() {
 }
 function drawStrips() {
   h.clearRect(0, 0, strips.width, strips.height);
-  d.robots.forEach((r, i) => {
-    const y = i * STRIP_HEIGHT, bytes = atob(r.strip[sample]);
+  const above = el("seen").scrollTop, first = Math.floor(above / STRIP_HEIGHT);
+  const count = Math.ceil(strips.clientHeight / STRIP_HEIGHT) + 1;
+  d.robots.slice(first, first + count).forEach((r, row) => {
+    const i = first + row, y = i * STRIP_HEIGHT - above, bytes = atob(r.strip[sample]);
     if (i === chosen) { h.fillStyle = MARK; h.fillRect(0, y, 384, STRIP_HEIGHT); }
     h.fillStyle = INK; h.fillText(i, 2, y + 11);
     for (let p = 0; p + 2 < bytes.length; p += 3) {

@@ -212,6 +212,41 @@ def test_everything_can_be_reached_by_hand_and_key(trial: Path, tmp_path: Path, 
     assert found["sought"] == pytest.approx(0.5, abs=0.05)
 
 
+MANY = """<pre id="result"></pre><script>
+const found = {};
+while (d.robots.length < 10000) { d.robots.push(d.robots[0]); d.bodies.push(d.bodies[0]); d.names.push(""); }
+layout();
+const seen = el("seen"), ratio = devicePixelRatio || 1;
+const strip = row => {
+  const y = (row * STRIP_HEIGHT - seen.scrollTop + 7) * ratio;
+  return [...h.getImageData(24 * ratio, y, 1, 1).data].slice(0, 3);
+};
+found.height = strips.height; found.rows = el("rows").offsetHeight; found.top = strip(0);
+choose(9000); found.scrolled = seen.scrollTop / STRIP_HEIGHT; found.chosen = strip(9000);
+seen.scrollTop = 1e9; drawStrips(); found.last = strip(9999);
+found.width = [document.documentElement.scrollWidth, innerWidth];
+zoomed(1 / 1.2, 100, 100); found.zoom = zoom;
+document.getElementById("result").textContent = JSON.stringify(found);
+</script></html>"""
+
+
+@needs_browser
+@pytest.mark.parametrize(("size", "has_walls"), [("1400,900", True), ("500,900", False)])
+def test_a_page_of_ten_thousand_robots(trial: Path, tmp_path: Path, size: str, has_walls: bool) -> None:
+    """The canvas of camera lines has the rows on screen only, and they scroll; a world without walls zooms out."""
+    record = read_trial(trial)
+    line = bytes([90, 14, 14] * 20)
+    record.columns["r0_strip"][:] = [line] * len(record.times)
+    text = page(record).replace('"walls":true', f'"walls":{str(has_walls).lower()}')
+    found = run_probe(text, MANY, tmp_path, size)
+    assert found["rows"] == 140_000
+    assert found["height"] < 2_000
+    assert (found["top"], found["chosen"], found["last"]) == ([90, 14, 14],) * 3
+    assert found["scrolled"] == 9_000
+    assert found["width"][0] <= found["width"][1]
+    assert found["zoom"] == pytest.approx(1 if has_walls else 1 / 1.2)
+
+
 POLICY = """<pre id="result">{"own": "blocked"}</pre><script>
 document.getElementById("result").textContent = JSON.stringify({own: "ran"});
 </script></html>"""
