@@ -14,8 +14,8 @@ from typing import Any
 import pytest
 
 from arena.campaign.campaign import Plan, controllers_of
+from arena.studio.errors import CommandRefusedError
 from arena.studio.process import Studio
-from arena.studio.session import CommandRefusedError
 from arena.trial.trial import run_trial
 from tests.arena.browser import needs_browser
 from tests.arena.studio.test_studio import do, run_probe, scene_of, scripted_plan, serving, studio_of, wait_for_state

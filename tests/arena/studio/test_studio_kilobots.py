@@ -8,7 +8,7 @@ import pytest
 
 from arena.campaign.campaign import Plan, controllers_of
 from arena.scene.loader import scene_of
-from arena.studio.session import CommandRefusedError
+from arena.studio.errors import CommandRefusedError
 from arena.trial.trial import run_trial
 from tests.arena.debug.test_attach import attached_client
 from tests.arena.studio.test_studio import do, studio_of, wait_for_state
