@@ -246,6 +246,7 @@ def test_the_exact_interval_is_what_the_test_does_not_reject() -> None:
     assert (few.low, few.high) == (-np.inf, np.inf)
 
 
+@pytest.mark.slow
 def test_the_exact_interval_covers_what_it_says() -> None:
     """The exact 90 % interval contains the mean in 90 % of 400 random sets of ten pairs, and of 40 sets of twenty."""
     rng = np.random.default_rng(6)

@@ -171,6 +171,7 @@ def test_compare_tells_how_far_robots_of_one_seed_are_apart(tmp_path: Path, caps
     assert 0 < apart[1][1]["median_cm"] <= apart[1][1]["max_cm"] < 5
 
 
+@pytest.mark.slow
 def test_report_writes_tables_and_figures_into_a_document(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """The report replaces the text between its marks; a document without marks is not changed."""
     document = tmp_path / "docs" / "page.md"

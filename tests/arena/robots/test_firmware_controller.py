@@ -211,6 +211,7 @@ def test_the_light_of_the_scene_scales_the_picture(talking_image: Path, alone: S
     assert dim == pytest.approx(lit / 2, rel=0.1)
 
 
+@pytest.mark.slow
 def test_reaction_finds_the_latency_and_no_missed_frame(clustering_image: Path) -> None:
     """experiment-contract.md §4: `arena reaction` gives the reaction times found by polling the wheels, within the
     polling period of 5 us, and no missed frame."""

@@ -136,6 +136,7 @@ def test_every_fault_has_its_documented_effect(firmware):
     assert (machine.pc, machine.resets[-1][1]) == (0, "BOR")
 
 
+@pytest.mark.slow
 def test_output_does_not_depend_on_the_number_of_jobs(firmware, capsys):
     """The output is the same for any --jobs, also if the campaign continues from half of its state file."""
     written = []

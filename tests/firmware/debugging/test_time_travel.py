@@ -120,6 +120,7 @@ def test_back_to_a_breakpoint_and_to_the_last_write(image: Build) -> None:
     remove_calls()
 
 
+@pytest.mark.slow
 def test_the_entry_of_an_interrupt_is_a_step_of_its_own(image: Build) -> None:
     """The entry of an interrupt is one step, both forward from the instruction before it and back from the handler."""
     machine = emu.load(image("culprit", TARGET_APPS))

@@ -67,6 +67,7 @@ def test_an_overflow_of_the_kernel_stack_is_caught_at_the_culprit(image: Build, 
     check_each_from(machine, "begin", check, KINDS)
 
 
+@pytest.mark.slow
 def test_half_a_kernel_stack_is_free_beside_an_ordinary_handler(image: Build) -> None:
     """The same program without an overflow runs: an ordinary handler leaves half of the kernel stack free."""
     machine = load(image("handlers", TARGET_APPS))

@@ -17,6 +17,8 @@ from emu.cli import main
 from emu.kernel_metrics.kernel_structures import SYSTEM_EVENTS
 from openswarm.testing.robot import Robot
 
+pytestmark = pytest.mark.slow
+
 HERE = Path(__file__).parent
 FIRMWARE = HERE.parents[2] / "firmware"
 PCB, EVENT, SUBSCRIPTION, MESSAGE = 18, 6, 8, 6
@@ -89,7 +91,6 @@ def test_names_of_system_events_are_those_of_the_headers():
         assert re.search(rf"\b{name} = {number:#04x}\b", text, re.IGNORECASE), name
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("stack", [1400, 2800])
 def test_a_larger_stack_fails_the_check_with_its_row_and_line(changed, baseline, capsys, stack):
     """Row and line are named, also if the thread no longer fits and the firmware stops at the thread's start."""
@@ -108,7 +109,6 @@ def test_a_larger_stack_fails_the_check_with_its_row_and_line(changed, baseline,
     assert out[-1].endswith(f"--update {baseline}")
 
 
-@pytest.mark.slow
 def test_main_and_a_thread_that_never_ran_have_rows(courier, changed, baseline, capsys):
     """The frame of a new thread takes ten words (hal_stack_init); an array in `main` counts in full."""
     image = changed(
@@ -175,7 +175,6 @@ def suite():
     return {name: row["value"] for name, row in rows.items()}
 
 
-@pytest.mark.slow
 def test_switches_take_the_cycles_that_the_kernels_suite_measures(courier, suite, capsys):
     words = ["cycles", courier, "--seconds", "0.025", "--function", "on_parcel"]
     found = facts(capsys, *words)["operations"]

@@ -79,6 +79,7 @@ def test_a_changed_option_builds_anew_and_so_does_the_way_back(make: Maker, word
     assert make.image.read_bytes() == plain
 
 
+@pytest.mark.slow
 def test_drivers_and_files_that_come_and_go_build_anew(make: Maker) -> None:
     """Removing a source file also causes a rebuild, although it leaves no newer file."""
     assert make()
@@ -128,6 +129,7 @@ def test_another_toolchain_port_or_compiler_builds_anew(make: Maker, writer: Pat
         assert make("TARGET=template")
 
 
+@pytest.mark.slow
 def test_a_failed_build_is_tried_again(tmp_path: Path) -> None:
     """The compiler itself builds here, without the kernel (BARE)."""
     make = Maker(tmp_path, sys.executable)

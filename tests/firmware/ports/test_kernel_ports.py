@@ -134,6 +134,7 @@ def test_the_options_of_the_dspic30f_conform(image: Build) -> None:
     check_conforms(said_by_epuck(image("conformance", TARGET_APPS, OPTIONS), 5), CHECKS_OF_OPTIONS)
 
 
+@pytest.mark.slow
 def test_the_options_of_the_kilobot_conform(tmp_path: Path) -> None:
     image = make("kilobot", "conformance", tmp_path, OPTIONS, apps=TARGET_APPS)
     check_conforms(said_by_kilobot(image, 5), CHECKS_OF_OPTIONS)
@@ -156,6 +157,7 @@ def test_listing_1_logs_on_the_kilobot(tmp_path: Path) -> None:
     assert said_by_kilobot(make("kilobot", "listing1", tmp_path), 2.0) == LINES
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("target", BOARDS)
 def test_listing_1_logs_in_qemu(target: str, tmp_path: Path) -> None:
     image = make(target, "listing1", tmp_path)

@@ -196,6 +196,7 @@ int main(void)
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("target", BOARDS)
 def test_a_fault_before_the_kernel_names_main(target: str, tmp_path: Path) -> None:
     """A report before Sys_Init_Kernel() names thread 0, although no thread exists yet."""

@@ -114,6 +114,7 @@ def test_an_option_of_ours_is_none_of_theirs(stand_in: Path) -> None:
     assert "unknown option" in done.stderr
 
 
+@pytest.mark.slow
 def test_the_kernel_is_gnu99() -> None:
     """The kernel compiles as gnu99: GCC 4.5 supports neither C11 nor later extensions."""
     if shutil.which("gcc") is None:

@@ -55,6 +55,7 @@ def test_tags_are_those_of_ascon_aead128(tmp_path):
     assert {int(size): text for size, text in made.items()} == ours
 
 
+@pytest.mark.slow
 def test_forged_and_replayed_programs_are_refused(tmp_path):
     """Every single bit of a program, of its version and size, and of each frame of a transfer is changed once.
 

@@ -151,6 +151,7 @@ def test_a_row_below_its_measurement_is_exceeded() -> None:
     assert StackRow("a", "main", "bytes", 49, 50).is_exceeded
 
 
+@pytest.mark.slow
 def test_an_unsound_stack_of_a_random_program_is_found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The campaign of random programs finds a stack bound that is two bytes too small."""
     assert examine(2, tmp_path)[0] == "bounded"
