@@ -21,6 +21,7 @@ from tests.watchdog import HANG
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="Unix sockets")
 NOBODY = 65534
+"""Number of the Unix user `nobody`."""
 as_root = pytest.mark.skipif(
     sys.platform != "linux" or os.geteuid() != 0, reason="only root can start a process of another user"
 )
